@@ -3,9 +3,11 @@
 
 #![allow(missing_docs, clippy::disallowed_methods)]
 
-use davit::model::monitor::{Comparison, Condition, ConditionKind, Interval, Monitor, Sampling, Signal, SignalKind};
+use davit::model::monitor::{
+    Comparison, Condition, ConditionKind, Interval, Monitor, MonitoredSignal, Sampling, SignalKind,
+};
 use davit::model::{EventName, Ident, Origin};
-use davit::monitor::{Bank, Sample};
+use davit::monitor::{Bank, InputSample};
 use davit::time::Time;
 use std::hint::black_box;
 use std::time::{Duration, Instant};
@@ -31,8 +33,8 @@ fn monitor(kind: ConditionKind) -> Monitor {
 }
 
 fn above(bound: f64) -> Box<Condition> {
-    let port = Signal::new(SignalKind::Port("A.x".parse().expect("a port")));
-    let right = Signal::new(SignalKind::Constant(bound));
+    let port = MonitoredSignal::new(SignalKind::Port("A.x".parse().expect("a port")));
+    let right = MonitoredSignal::new(SignalKind::Constant(bound));
     let kind = ConditionKind::Compare { left: port, op: Comparison::Above, right, hysteresis: None };
     Box::new(Condition::new(kind))
 }
@@ -59,7 +61,7 @@ fn measure(kind: ConditionKind, window: u64, shape: fn(u64, f64) -> f64) -> f64 
         seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         let noise = (seed >> 33) as f64 / (1_u64 << 31) as f64;
         let at = Time(i * STEP);
-        let sample = Sample { value: shape(i, noise), at, writes: i + 1, present: true };
+        let sample = InputSample { value: shape(i, noise), at, writes: i + 1, present: true };
         bank.step(at, &mut |_| sample, &mut |_, _| raised += 1);
     }
     let took = started.elapsed();

@@ -4,8 +4,8 @@
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use davit::model::*;
-use davit::plan::{Context, plan};
-use davit::stack::{Op, Requester, Resolved, Stack, Switch, transaction};
+use davit::plan::{PlanContext, plan};
+use davit::stack::{Op, Requester, ResolvedStep, Stack, Switch, transaction};
 use davit::system::{System, step};
 use davit::time::Time;
 use std::collections::BTreeMap;
@@ -82,7 +82,7 @@ fn deployment(n: usize) -> Configuration {
 
 fn deployed(n: usize) -> System {
     let mut system = System::new(catalogue());
-    let plan = plan(&system, &deployment(n), &Context::default()).expect("a chain is accepted");
+    let plan = plan(&system, &deployment(n), &PlanContext::default()).expect("a chain is accepted");
     for s in &plan.steps {
         step::apply(&s.step, &mut system).expect("a planned step is allowed");
     }
@@ -107,11 +107,11 @@ fn switches(c: &mut Criterion) {
         let system = deployed(n);
         let conf = switch("switch", 2.0);
         group.bench_with_input(BenchmarkId::new("plan", n), &n, |b, _| {
-            b.iter(|| plan(black_box(&system), &conf, &Context::default()).expect("accepted"));
+            b.iter(|| plan(black_box(&system), &conf, &PlanContext::default()).expect("accepted"));
         });
         let mut system = deployed(n);
         let mut stack = Stack::new(64);
-        let context = Context::default();
+        let context = PlanContext::default();
         let push = |configuration| Op::Push { configuration, requester: Requester::Operator, at: Time(0), scope: None };
         let (eight, five) = (switch("eight", 2.0), switch("five", 3.0));
         let first = transaction(&system, &stack, &[push(&eight)], &context).expect("accepted");
@@ -129,12 +129,12 @@ fn switches(c: &mut Criterion) {
         let configuration = switch("switch", 2.0);
         let (requester, at) = (Requester::Operator, Time(0));
         let push = Op::Push { configuration: &configuration, requester, at, scope: None };
-        let planned = transaction(&system, &stack, &[push], &Context::default()).expect("accepted");
+        let planned = transaction(&system, &stack, &[push], &PlanContext::default()).expect("accepted");
         let mut prepared = Switch::new(&system, &configuration, &planned).expect("a fixed switch");
         drop(planned);
         let perform = |switch: &Switch, undoing, system: &mut System| {
             let mut done = 0;
-            while let Some(Resolved { step, place, value, .. }) = switch.step(done, undoing) {
+            while let Some(ResolvedStep { step, place, value, .. }) = switch.step(done, undoing) {
                 black_box(value);
                 assert!(place.precondition(step, system).is_empty());
                 place.effect(step, system);
@@ -163,7 +163,7 @@ fn deployments(c: &mut Criterion) {
         let conf = deployment(n);
         group.throughput(Throughput::Elements(n as u64));
         group.bench_with_input(BenchmarkId::new("plan", n), &n, |b, _| {
-            b.iter(|| plan(&system, &conf, &Context::default()).expect("accepted"));
+            b.iter(|| plan(&system, &conf, &PlanContext::default()).expect("accepted"));
         });
     }
     group.finish();

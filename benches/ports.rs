@@ -50,12 +50,12 @@ struct Mirror {
 const ROUNDS: u32 = 1_000_000;
 
 impl Mirror {
-    fn time(mut f: impl FnMut(u32)) -> Answer<f64> {
+    fn time(mut f: impl FnMut(u32)) -> OperationAnswer<f64> {
         let start = Instant::now();
         for i in 0..ROUNDS {
             f(i);
         }
-        Answer::Done(start.elapsed().as_nanos() as f64 / f64::from(ROUNDS))
+        OperationAnswer::Done(start.elapsed().as_nanos() as f64 / f64::from(ROUNDS))
     }
 }
 

@@ -7,7 +7,7 @@ use davit::app;
 use davit::lang::LoadOptions;
 use davit::libraries;
 use davit::model::{Ask, ConfigId, EventName};
-use davit::runtime::{Answer, Builder, Component, Library};
+use davit::runtime::{Builder, Component, Library, OperationAnswer};
 use davit::session::{Happening, Session};
 use davit::time::{Clock, Time};
 use std::sync::Arc;
@@ -22,7 +22,7 @@ struct Stuck;
 
 impl Component for Stuck {
     fn new(b: &mut Builder<Self>) -> Self {
-        b.no_effect().operation("hang", |_, cx, (): ()| -> Answer { cx.clock().hang() });
+        b.no_effect().operation("hang", |_, cx, (): ()| -> OperationAnswer { cx.clock().hang() });
         Self
     }
 }

@@ -9,7 +9,7 @@
 use criterion::{BenchmarkId, Criterion, criterion_group};
 use davit::model::finding::Origin;
 use davit::model::names::{EventName, Ident};
-use davit::model::statechart::{Action, Node, State, Statechart, Transition, Trigger};
+use davit::model::statechart::{Action, ChartNode, ChartTransition, State, Statechart, Trigger};
 use davit::statechart::{AtOnce, Chart, EventId, Hook, Machine, Raised, compile};
 use davit::time::Time;
 use std::hint::black_box;
@@ -21,8 +21,8 @@ fn state(name: &str) -> State {
     state
 }
 
-fn transition(src: &str, tgt: &str, event: &str) -> Transition {
-    Transition::new(src, tgt, (!event.is_empty()).then(|| Trigger::parse(event).unwrap()))
+fn transition(src: &str, tgt: &str, event: &str) -> ChartTransition {
+    ChartTransition::new(src, tgt, (!event.is_empty()).then(|| Trigger::parse(event).unwrap()))
 }
 
 fn compiled(root: State) -> Chart {
@@ -31,7 +31,7 @@ fn compiled(root: State) -> Chart {
 
 fn toggle() -> Chart {
     let mut root = state("root");
-    root.children = vec![Node::State(state("off")), Node::State(state("on"))];
+    root.children = vec![ChartNode::State(state("off")), ChartNode::State(state("on"))];
     root.transitions =
         vec![transition("initial", "off", ""), transition("off", "on", "e"), transition("on", "off", "e")];
     compiled(root)
@@ -45,10 +45,10 @@ fn rings(groups: usize, per_group: usize) -> Chart {
         let mut group = state(&format!("g{g}"));
         group.transitions.push(transition("initial", "s0", ""));
         for i in 0..per_group {
-            group.children.push(Node::State(state(&format!("s{i}"))));
+            group.children.push(ChartNode::State(state(&format!("s{i}"))));
             group.transitions.push(transition(&format!("s{i}"), &format!("s{}", (i + 1) % per_group), "next"));
         }
-        root.children.push(Node::State(group));
+        root.children.push(ChartNode::State(group));
         root.transitions.push(transition(&format!("g{g}"), &format!("g{}", (g + 1) % groups), "over"));
     }
     compiled(root)
@@ -70,7 +70,7 @@ impl<T> Batch<T> {
 }
 
 impl Hook for Batch<Raised> {
-    const TURNS: bool = false;
+    const MICROSTEPS: bool = false;
     const WATCHES: bool = false;
 
     fn raised(&mut self, _: &Chart, raised: Raised) {

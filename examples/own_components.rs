@@ -6,7 +6,7 @@
 //! cargo run --example own_components -- deploy examples/own_components/deployment.yaml
 //! ```
 
-use davit::component::{Answer, Builder, Component, Context, In, Library, Out, Prop};
+use davit::component::{Builder, Component, Context, In, Library, OperationAnswer, Out, Prop};
 
 /// A first-order low-pass filter.
 struct LowPass {
@@ -22,7 +22,7 @@ impl Component for LowPass {
         b.doc("Forgets what came before: the next sample is passed as it is.").no_effect();
         b.operation("reset", |this: &mut Self, _: &mut Context, ()| {
             this.state = None;
-            Answer::Done(())
+            OperationAnswer::Done(())
         });
         Self {
             u: b.doc("What comes in.").input("u"),

@@ -117,7 +117,7 @@ pub use app::{StartError, start, start_on};
 pub use session::{Command, Ended, NotRaised, NotUp, Phase, Session, StatusView, Unanswered};
 
 // Whole programs.
-pub use app::script::{Interrupt, Options as ScriptOptions, ScriptEnd, run as run_script};
+pub use app::script::{Interrupt, ScriptEnd, ScriptOptions, run as run_script};
 pub use cli::main;
 
 /// What component types of one's own are written with.
@@ -126,11 +126,11 @@ pub use cli::main;
 /// with a [`Builder`](component::Builder), and is updated by an activity; it knows no other component, no configuration
 /// and no coordinator.
 pub mod component {
-    pub use crate::model::monitor::Part as ValuePart;
+    pub use crate::model::monitor::ValuePart;
     pub use crate::record;
     pub use crate::runtime::{
-        Answer, Builder, Component, Context, EventIn, EventOut, Failure, In, Libraries, Library, Out, PortValue, Prop,
-        Sample, Ticket,
+        Builder, Component, Context, EventIn, EventOut, Failure, In, Libraries, Library, OperationAnswer, Out,
+        PortValue, Prop, Sample, Ticket,
     };
 
     /// What [`record!`](crate::record) writes.
@@ -151,6 +151,8 @@ pub mod platforms {
         Catalogue, Cause, ComponentSnapshot, ComponentType, Execution, Outcome, PlatformKind, PropertyType, Tunable,
     };
     pub use crate::platform::conformance;
-    pub use crate::platform::simulated::{Options as SimulatedOptions, Simulated};
-    pub use crate::platform::{EventSink, ObserveError, Platform, PlatformEvent, Prepared};
+    pub use crate::platform::simulated::{Simulated, SimulatedOptions};
+    pub use crate::platform::{
+        EventSink, ObserveError, Platform, PlatformEvent, Prepared, StepBatch, TimedOutcome, TimedStep,
+    };
 }

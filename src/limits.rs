@@ -196,7 +196,7 @@ pub const INBOX_ROW: usize = 16;
 
 /// Reactions of a coordinator at one moment of simulated time, after which each further one takes [`MOMENT_PAUSE`]: more than
 /// what its inbox holds.
-pub const MOMENT_TURNS: u32 = 10_000;
+pub const MOMENT_ITERATIONS: u32 = 10_000;
 
 /// What a reaction takes then: a deadline of seconds comes after some thousand rounds.
 pub const MOMENT_PAUSE: Duration = Duration::from_millis(1);
@@ -288,12 +288,12 @@ pub const CONFIGURATOR_CONTROL: usize = 256;
 /// Blocking platform calls made at the same time at most, whatever the deployment says: each takes a thread.
 pub const WORKERS_MOST: usize = 64;
 
-/// Brief steps handed to a platform in one call: the way to the worker and back is then a small part of them.
-pub const BRIEF_STEPS: usize = 256;
+/// Steps handed to a platform in one call: the way there and back is then a small part of them.
+pub const BATCH_STEPS: usize = 256;
 
-/// How long after the first of several brief steps the last of one call may begin: what waits for the call is not kept
-/// waiting by their number.
-pub const BRIEF_TURN: Duration = Duration::from_millis(10);
+/// How long after the first step of a batch the embedded platform begins the last one of one call, and after which it tells
+/// what was done so far: what waits for that is not kept waiting by their number, nor by one that hangs.
+pub const BATCH_SEQUENCE: Duration = Duration::from_millis(10);
 
 /// Workers that may be stuck in calls a platform never answered, beside those at work: then no further call is made, since
 /// each holds a thread for ever.
@@ -426,7 +426,7 @@ pub const FORCE_ROUNDS: usize = 3;
 /// chance in another order.
 pub const REPLAY_STEP: Duration = Duration::from_millis(20);
 
-/// So many rounds of a circle that a script goes again and again are written out: the first, the last, and one between that is
+/// So many rounds of a cycle that a script goes again and again are written out: the first, the last, and one between that is
 /// repeated.
 pub const REPLAY_ROUNDS: usize = 3;
 

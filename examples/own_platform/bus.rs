@@ -1,7 +1,8 @@
-//! The platform `bus`: every step goes as a line of text to what stands at the other end of a device.
+//! The platform `bus`: steps go as lines of text to what stands at the other end of a device, and what may go together goes in
+//! one line.
 
 use davit::platforms::{
-    Catalogue, Cause, ComponentSnapshot, EventSink, Execution, ObserveError, Outcome, Platform, Simulated,
+    Catalogue, Cause, ComponentSnapshot, EventSink, Execution, ObserveError, Outcome, Platform, Simulated, StepBatch,
 };
 use davit::{ComponentName, Snapshot, Step, Time};
 use std::io::Write;
@@ -19,11 +20,20 @@ impl Bus {
         Self { device: Mutex::new(device), prefix, books }
     }
 
-    /// What was not sent was not done.
-    fn send(&self, step: &Step) -> Result<(), Outcome> {
+    /// One message. What was not sent was not done.
+    fn send(&self, steps: &[&Step]) -> Result<(), Outcome> {
+        let words: Vec<String> = steps.iter().map(ToString::to_string).collect();
         let mut device = self.device.lock().unwrap_or_else(PoisonError::into_inner);
-        let sent = writeln!(device, "{}{step}", self.prefix);
+        let sent = writeln!(device, "{}{}", self.prefix, words.join("; "));
         sent.map_err(|why| Outcome::NotDone(Cause::Refused(format!("the bus: {why}"))))
+    }
+
+    /// The answer to a step that was sent. A real one waits for it here, until the deadline.
+    fn answer(&self, step: &Step, deadline: Time, safe: bool) -> Outcome {
+        match safe {
+            true => self.books.execute_safe(step, deadline),
+            false => Platform::execute(&self.books, step, deadline),
+        }
     }
 }
 
@@ -37,12 +47,41 @@ impl Platform for Bus {
         Execution::Blocking
     }
 
+    /// A message costs more than a step.
+    fn batches(&self, _: &Step) -> bool {
+        true
+    }
+
     fn execute(&self, step: &Step, deadline: Time) -> Outcome {
-        self.send(step).map_or_else(|refused| refused, |()| Platform::execute(&self.books, step, deadline))
+        self.send(&[step]).map_or_else(|refused| refused, |()| self.answer(step, deadline, false))
     }
 
     fn execute_safe(&self, step: &Step, deadline: Time) -> Outcome {
-        self.send(step).map_or_else(|refused| refused, |()| self.books.execute_safe(step, deadline))
+        self.send(&[step]).map_or_else(|refused| refused, |()| self.answer(step, deadline, true))
+    }
+
+    /// All that may begin goes in one message; the other end does one after the other and answers each as it ends, and begins
+    /// none behind one that is not done.
+    fn execute_batch(&self, batch: &StepBatch) {
+        let begun = batch.begin(usize::MAX);
+        let steps: Vec<&Step> = begun.iter().map(|timed| &timed.step).collect();
+        if steps.is_empty() {
+            return;
+        }
+        if let Err(refused) = self.send(&steps) {
+            return batch.answer(refused);
+        }
+        for (i, step) in steps.into_iter().enumerate() {
+            if i > 0 && batch.is_stopped() {
+                return;
+            }
+            let outcome = self.answer(step, batch.deadline(), batch.is_safe());
+            let done = matches!(outcome, Outcome::Done(_));
+            batch.answer(outcome);
+            if !done {
+                return;
+            }
+        }
     }
 
     fn cancel(&self, step: &Step) {

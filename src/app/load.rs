@@ -33,7 +33,7 @@ pub struct Read {
 #[derive(Debug, Clone)]
 pub struct Checked {
     /// The deployment.
-    pub deployment: check::Checked<Deployment>,
+    pub deployment: check::Accepted<Deployment>,
     /// The component types it may use.
     pub catalogue: Catalogue,
     /// The libraries it names.
@@ -150,7 +150,7 @@ pub fn check_to_replay(read: Read) -> Result<Checked, Refused> {
 
 fn checked(
     read: Read,
-    take: impl FnOnce(&mut Report) -> Option<check::Checked<crate::model::Deployment>>,
+    take: impl FnOnce(&mut Report) -> Option<check::Accepted<crate::model::Deployment>>,
 ) -> Result<Checked, Refused> {
     let Read { deployment, catalogue, libraries, platform, sources, findings: before } = read;
     let mut report = check::run(deployment, &catalogue);

@@ -1,11 +1,11 @@
 //! What configurations mean before anything runs: by name, or as the coordinators ask for them on their way.
 
 use super::Read;
-use crate::check::{self, Drive, Happening, Until};
+use crate::check::{self, Drive, Until, WayEvent};
 use crate::model::codes::{CLI_UNKNOWN_CONFIGURATION, DEPLOY_NEVER_DOWN, DEPLOY_NEVER_UP};
 use crate::model::finding::{configuration, did_you_mean, has_errors};
 use crate::model::{Ask, ConfigId, Finding, Findings, Ident, Snapshot};
-use crate::plan::{Context, PlannedStep};
+use crate::plan::{PlanContext, PlannedStep};
 use crate::stack::{Op, Requester, Stack, transaction};
 use crate::system::{System, step};
 use crate::time::Time;
@@ -81,7 +81,7 @@ pub fn plan(read: &Read, names: &[impl AsRef<str>]) -> Result<Vec<Application>, 
     if has_errors(&wrong) {
         return Err(wrong);
     }
-    let context = Context::of(deployment);
+    let context = PlanContext::of(deployment);
     let mut system = System::new(Arc::new(read.catalogue.clone()));
     let mut stack = Stack::new(deployment.limits.stack);
     let mut planned = Vec::new();
@@ -118,8 +118,8 @@ pub fn plan_way(read: &Read, until: Until) -> Result<Vec<Application>, Findings>
     let mut planned = Vec::new();
     for happening in drive.happenings {
         match happening {
-            Happening::Event { coordinator, event, .. } => heard.entry(coordinator).or_default().push(event),
-            Happening::Applied { coordinator, asks, steps, result, state } => planned.push(Application {
+            WayEvent::Event { coordinator, event, .. } => heard.entry(coordinator).or_default().push(event),
+            WayEvent::Applied { coordinator, asks, steps, result, state } => planned.push(Application {
                 events: heard.remove(&coordinator).unwrap_or_default(),
                 coordinator: several.then(|| coordinator.to_string()),
                 asks,
@@ -151,8 +151,8 @@ pub fn drive(read: &Read, until: Until) -> Result<(Drive, Result<(), Findings>),
     };
     let stops = format!("{what} stops at `{}`", of(&drive.state));
     let on_the_way = drive.happenings.iter().flat_map(|happening| match happening {
-        Happening::Applied { asks, .. } => asks.as_slice(),
-        Happening::Event { .. } => &[],
+        WayEvent::Applied { asks, .. } => asks.as_slice(),
+        WayEvent::Event { .. } => &[],
     });
     let on_the_way = on_the_way.chain(drive.refused.iter().map(|(ask, _)| ask));
     let applied = on_the_way.filter_map(|ask| if let Ask::Apply(id) = ask { Some(*id) } else { None });

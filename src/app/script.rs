@@ -18,7 +18,7 @@ use crate::lang::{LoadOptions, Sources};
 use crate::limits;
 use crate::model::finding::did_you_mean;
 use crate::model::{Ask, ConfigId, Ident};
-use crate::session::tap::Hears;
+use crate::session::tap::LogSink;
 use crate::session::{Ended, Hub, NO_FORWARD, NotNamed, NotUp, Session, Unanswered, recovery};
 use crate::time::{Clock, Time};
 use failure::IsRefused;
@@ -34,7 +34,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 /// What a script runs on.
-pub struct Options {
+pub struct ScriptOptions {
     /// The clock; the calling thread is made a participant.
     pub clock: Clock,
     /// Component libraries and platforms.
@@ -44,7 +44,7 @@ pub struct Options {
     /// The platform they run on, instead of the one they name.
     pub platform: Option<Ident>,
     /// Hears everything that happens.
-    pub observer: Option<Arc<dyn Hears>>,
+    pub observer: Option<Arc<dyn LogSink>>,
     /// Where `say` goes.
     pub say: Box<dyn Fn(&str)>,
     /// By what somebody outside stops it.
@@ -53,7 +53,7 @@ pub struct Options {
     pub door: Option<Door>,
 }
 
-/// See [`Options::door`].
+/// See [`ScriptOptions::door`].
 pub type Door = Box<dyn Fn(&Arc<Session>) -> Result<Box<dyn Any>, String>>;
 
 /// How a script ended.
@@ -66,7 +66,7 @@ pub struct ScriptEnd {
 }
 
 struct ScriptHost {
-    options: Options,
+    options: ScriptOptions,
     folder: PathBuf,
     session: Option<Arc<Session>>,
     /// By what it is reached from outside.
@@ -86,7 +86,7 @@ type SharedHost = Rc<RefCell<ScriptHost>>;
 const RECOVERY: Duration = limits::SCRIPT_RECOVERY;
 
 /// Runs the script at `path`.
-pub fn run(path: &Path, options: Options) -> ScriptEnd {
+pub fn run(path: &Path, options: ScriptOptions) -> ScriptEnd {
     let text = match Sources::Disk.read(path) {
         Ok(text) => text,
         Err(finding) => return ScriptEnd { failure: Some(ScriptFailure::Unreadable(finding)), ended: None },
@@ -216,7 +216,10 @@ fn install(lua: &Lua, host: &SharedHost) -> mlua::Result<()> {
         values::to_lua(lua, &serde_json::to_value(drift).expect("plain data"))
     });
     function!("recover", String, |h, _lua, how| recover(h, &how));
-    function!("wait", f64, |h, _lua, seconds| {
+    function!("wait", LuaValue, |h, _lua, seconds| {
+        let seconds = seconds.as_f64().ok_or_else(|| {
+            error("`wait` takes seconds: `wait(0.5)`; what waits for an answer is `wait_answer(\"ID.ok\", 5)`, for a state `wait_state(\"NAME\", 5)`")
+        })?;
         let (clock, until, interrupt) = (clock(h), deadline(h, seconds)?, interrupt(h));
         interrupt.sleep(&clock, until)
     });

@@ -4,7 +4,7 @@ use super::Checked;
 use super::platforms::{Make, Making};
 use crate::functions::Opener;
 use crate::limits;
-use crate::model::{Coordinator, Deployment, FaultKind, SimulatedReaction, StepFault};
+use crate::model::{Coordinator, Deployment, FaultKind, Findings, SimulatedReaction, StepFault};
 use crate::platform::Platform;
 use crate::platform::embedded::EmbeddedPlatform;
 use crate::platform::simulated::{self, Fault, FaultRule, Simulated, StepPattern};
@@ -24,12 +24,29 @@ pub enum StartError {
         /// Why, in its own words.
         why: String,
     },
+    /// The platform has component types otherwise than the deployment was checked with them, so that its plans could fail there.
+    #[error("the platform `{name}` has other component types than the deployment was checked with: {}", told(.findings))]
+    Types {
+        /// Its name.
+        name: String,
+        /// Each difference.
+        findings: Findings,
+    },
     /// The functions of the coordinator could not be opened.
     #[error("the coordinator's functions cannot be run: {why}")]
     Functions {
         /// Why.
         why: String,
     },
+}
+
+/// The first few differences, in words.
+fn told(findings: &Findings) -> String {
+    let told: Vec<&str> = findings.iter().take(3).map(|finding| finding.message.as_str()).collect();
+    match findings.len().checked_sub(told.len()) {
+        None | Some(0) => told.join("; "),
+        Some(more) => format!("{}; and {more} more", told.join("; ")),
+    }
 }
 
 /// What the deployment says that its components raise by themselves, for a simulated platform of one's own making.
@@ -95,11 +112,11 @@ pub(super) fn start_open(
         Make::Embedded => (Arc::new(EmbeddedPlatform::new(clock, &checked.libraries, &deployment.activities)), None),
         Make::Simulated => {
             let reactions = if played == Played::Replayed { Vec::new() } else { reactions(deployment) };
-            let options = simulated::Options {
+            let options = simulated::SimulatedOptions {
                 faults: faults(deployment),
                 reactions,
                 blocking: played != Played::AsWritten,
-                ..simulated::Options::default()
+                ..simulated::SimulatedOptions::default()
             };
             let platform = Simulated::new(checked.catalogue.clone(), clock.clone(), options);
             (Arc::new(platform.clone()), Some(platform))
@@ -107,7 +124,12 @@ pub(super) fn start_open(
         Make::Own(make) => {
             let making = Making { checked, clock, options: &deployment.platform_options };
             let name = deployment.platform.to_string();
-            (make(&making).map_err(|why| StartError::Platform { name, why })?, None)
+            let platform = make(&making).map_err(|why| StartError::Platform { name: name.clone(), why })?;
+            let findings = crate::check::on_platform(deployment, &checked.catalogue, platform.catalogue());
+            if !findings.is_empty() {
+                return Err(StartError::Types { name, findings });
+            }
+            (platform, None)
         }
     };
     Ok((start_on(checked, platform, clock), simulated))

@@ -1,12 +1,12 @@
 //! What coordinators hand on: requests come to the desk, emitted names to the others' inboxes.
 
-use super::few::Few;
 use super::product::Product;
-use super::reactions::{Handed, Reaction};
-use super::state::{Answers, Failed, Interrupted, Move, Next, Nexts, State, bit, index};
+use super::reactions::{Handed, Macrostep};
+use super::shared_list::SharedList;
+use super::state::{Answers, Failed, Interrupted, Move, Next, Nexts, ProductState, States, bit, index, one};
 use crate::limits;
 use crate::model::{Ask, ConfigId, EventName, Findings, RequestId, Verdict, codes};
-use crate::stack::{Arrival, Arrived, Batch, Request, Requester, Turn, Why, given_up_of};
+use crate::stack::{ActiveBatch, Arrival, Arrived, Batch, Request, Requester, Why, given_up_of};
 use crate::statechart::{EventId, NodeId};
 use smallvec::SmallVec;
 
@@ -17,7 +17,7 @@ fn is_for_room(why: &Findings) -> bool {
 
 impl Product<'_> {
     /// A coordinator hears an event, and comes to rest again.
-    pub(super) fn react(&mut self, mut state: State, by: usize, event: EventId) -> Vec<State> {
+    pub(super) fn react(&mut self, mut state: ProductState, by: usize, event: EventId) -> States {
         let reaction = self.members[by].react(state.leaves[by], event);
         let (chart, deployment) = (self.members[by].chart, self.deployment);
         state.leaving &= !(reaction.taken && event == chart.event(deployment.deploy.event) && event != EventId::OTHER);
@@ -28,10 +28,10 @@ impl Product<'_> {
     }
 
     /// Brings a reaction of a coordinator into a state. More than one: it makes a difference what is over already.
-    pub(super) fn follow(&mut self, mut state: State, by: usize, reaction: &Reaction) -> Vec<State> {
+    pub(super) fn follow(&mut self, mut state: ProductState, by: usize, reaction: &Macrostep) -> States {
         state.leaves[by] = reaction.leaf;
         self.forget(&mut state, by, &reaction.left);
-        let mut states = vec![state];
+        let mut states = one(state);
         let requester = self.members[by].by;
         // A coordinator that does not come to rest asks without end, and each time may come before or after what ends.
         self.forked |= reaction.handed.len() > limits::CHECK_HANDED;
@@ -42,7 +42,7 @@ impl Product<'_> {
                     Batch::one(Request { why: Why::Down, ..Request::new(RequestId(0), Ask::Undo, requester) })
                 }
             };
-            states = states.into_iter().flat_map(|state| self.arrive(state, batch.clone())).collect();
+            states = self.all_arrive(states, &batch);
             self.forked |= states.len() > limits::CHECK_FORKS;
             states.truncate(limits::CHECK_FORKS);
         }
@@ -56,7 +56,7 @@ impl Product<'_> {
     }
 
     /// Nobody hears the answers any more whose state has been left.
-    fn forget(&self, state: &mut State, by: usize, left: &[NodeId]) {
+    fn forget(&self, state: &mut ProductState, by: usize, left: &[NodeId]) {
         if left.is_empty() {
             return;
         }
@@ -67,7 +67,9 @@ impl Product<'_> {
                 request.tag = (0, 0);
             }
         };
-        state.desk.requests_mut().for_each(gone);
+        if !state.desk.is_empty() {
+            state.desk.requests_mut().for_each(gone);
+        }
         state.safe.iter_mut().for_each(gone);
         state.due.iter_mut().for_each(|(request, _)| gone(request));
         state.due.retain(|(request, _)| self.tells_all || is_for_somebody(request));
@@ -75,17 +77,20 @@ impl Product<'_> {
         if self.tells_all && self.members.len() > 1 {
             state.telling.retain(|(request, _)| is_for_somebody(request));
         }
-        state.flight.iter_mut().flat_map(|batch| &mut batch.requests).for_each(gone);
+        state.in_transit.iter_mut().flat_map(|batch| &mut batch.requests).for_each(gone);
     }
 
     /// The batches under way that `batch` would stop.
-    pub(super) fn stopped_by(&self, state: &State, batch: &Batch) -> SmallVec<[u32; 2]> {
+    pub(super) fn stopped_by(&self, state: &ProductState, batch: &Batch) -> SmallVec<[u32; 2]> {
+        if state.desk.is_empty() {
+            return SmallVec::new();
+        }
         let is_safe = |id: ConfigId| self.worlds.configuration(id).is_some_and(|c| c.safe);
         let mut trial = state.desk.clone();
         let Arrival { safe, given_up, .. } = trial.arrive(batch.clone(), is_safe, &self.worlds.claims);
         let mut stopped: SmallVec<[u32; 2]> = given_up.iter().map(|(number, _)| *number).collect();
         if !safe.is_empty() {
-            stopped.extend(state.desk.under_way().iter().map(|turn| turn.number));
+            stopped.extend(state.desk.under_way().iter().map(|active| active.number));
         }
         stopped.retain(|number| !state.is_stopped(*number));
         stopped.sort_unstable();
@@ -94,13 +99,17 @@ impl Product<'_> {
     }
 
     /// Whether `batch` would stop, overtake or cancel anything: then it makes a difference when it comes.
-    pub(super) fn meddles(&self, state: &State, batch: &Batch) -> bool {
+    pub(super) fn meddles(&self, state: &ProductState, batch: &Batch) -> bool {
+        // What comes alone, and first, finds nothing to stop.
+        if state.desk.is_empty() && batch.requests.len() == 1 {
+            return false;
+        }
         let is_safe = |id: ConfigId| self.is_safe(id);
         let arrival = state.desk.clone().arrive(batch.clone(), is_safe, &self.worlds.claims);
         // Also what waits its turn behind others: by then these may be over.
         let finds = |undo: &Request| {
-            let mut turns = state.desk.under_way().iter();
-            turns.any(|turn| given_up_of(undo, &turn.batch.requests).is_some())
+            let mut active_batches = state.desk.under_way().iter();
+            active_batches.any(|active| given_up_of(undo, &active.batch.requests).is_some())
         };
         // Who stands in the queue as down may be taken up before a safe configuration makes everything wait.
         let is_down = |batch: &Batch| batch.requests.first().is_some_and(|request| request.why == Why::Down);
@@ -110,18 +119,18 @@ impl Product<'_> {
             || !arrival.safe.is_empty() && state.desk.waiting().any(is_down)
     }
 
-    /// What is in flight comes now, or later where that makes a difference.
-    pub(super) fn lands(&mut self, mut state: State) -> SmallVec<[State; 2]> {
+    /// What is in transit comes now, or later where that makes a difference.
+    pub(super) fn lands(&mut self, mut state: ProductState) -> States {
         let mut states = SmallVec::new();
-        if state.flight.first().is_some_and(|batch| self.meddles(&state, batch)) {
+        if state.in_transit.first().is_some_and(|batch| self.meddles(&state, batch)) {
             states.push(state.clone());
         }
-        let mut flight = std::mem::take(&mut state.flight).into_iter();
-        let first = flight.next().map_or_else(|| state.clone(), |batch| self.take_in(state.clone(), batch));
+        let mut in_transit = std::mem::take(&mut state.in_transit).into_iter();
+        let first = in_transit.next().map_or_else(|| state.clone(), |batch| self.take_in(state.clone(), batch));
         // What came with it may find that it has not begun.
-        let mut landed = vec![first];
-        for batch in flight {
-            landed = landed.into_iter().flat_map(|state| self.arrive(state, batch.clone())).collect();
+        let mut landed = one(first);
+        for batch in in_transit {
+            landed = self.all_arrive(landed, &batch);
             self.forked |= landed.len() > limits::CHECK_FORKS;
             landed.truncate(limits::CHECK_FORKS);
         }
@@ -129,28 +138,39 @@ impl Product<'_> {
         states
     }
 
+    fn all_arrive(&mut self, states: States, batch: &Batch) -> States {
+        let mut arrived = States::new();
+        for state in states {
+            arrived.extend(self.arrive(state, batch.clone()));
+        }
+        arrived
+    }
+
     /// A batch comes. More than one state: what it would stop may not have begun, or be over already.
-    pub(super) fn arrive(&mut self, mut state: State, batch: Batch) -> Vec<State> {
-        if !state.flight.is_empty() {
-            state.flight.push(batch);
-            return vec![state];
+    pub(super) fn arrive(&mut self, mut state: ProductState, batch: Batch) -> States {
+        if !state.in_transit.is_empty() {
+            state.in_transit.push(batch);
+            return one(state);
         }
         let mut stops = self.stopped_by(&state, &batch);
         // What an undo would wait its turn behind, but overtake where it has not begun.
-        let about = |turn: &&Turn| batch.requests.iter().any(|undo| given_up_of(undo, &turn.batch.requests).is_some());
-        let behind = state.desk.under_way().iter().filter(about).map(|turn| turn.number);
+        let about = |active: &&ActiveBatch| {
+            batch.requests.iter().any(|undo| given_up_of(undo, &active.batch.requests).is_some())
+        };
+        let behind = state.desk.under_way().iter().filter(about).map(|active| active.number);
         let behind: SmallVec<[u32; 2]> = behind.filter(|of| !stops.contains(of) && !state.is_stopped(*of)).collect();
         stops.extend(behind.iter().copied());
-        let mut states = Vec::with_capacity(1);
+        let mut states = States::new();
         if self.races && self.meddles(&state, &batch) {
-            states.push(State { flight: Few::from_iter([batch.clone()]), ..state.clone() });
+            states.push(ProductState { in_transit: SharedList::from_iter([batch.clone()]), ..state.clone() });
             let is_safe = |r: &Request| matches!(r.ask, Ask::Apply(id) if self.is_safe(id));
             // Given up alone and once, it is answered the same way at whatever time.
-            let among = |turn: &Turn| {
-                let gives_up = |request: &&Request| given_up_of(request, &turn.batch.requests).is_some();
+            let among = |active: &ActiveBatch| {
+                let gives_up = |request: &&Request| given_up_of(request, &active.batch.requests).is_some();
                 let twice = batch.requests.iter().filter(gives_up).count() > 1;
-                let differs = self.tells_all || turn.batch.requests.len() > 1 || twice || behind.contains(&turn.number);
-                stops.contains(&turn.number) && differs
+                let differs =
+                    self.tells_all || active.batch.requests.len() > 1 || twice || behind.contains(&active.number);
+                stops.contains(&active.number) && differs
             };
             if batch.requests.iter().any(is_safe) || state.desk.under_way().iter().any(among) {
                 // Any of them, but no more than a few at once.
@@ -180,7 +200,7 @@ impl Product<'_> {
     }
 
     /// A batch comes to the desk.
-    pub(super) fn take_in(&mut self, mut state: State, batch: Batch) -> State {
+    pub(super) fn take_in(&mut self, mut state: ProductState, batch: Batch) -> ProductState {
         // To come to *down* twice with nothing asked for in between is to come once.
         let is_down = |batch: &Batch| batch.requests.first().is_some_and(|request| request.why == Why::Down);
         let same =
@@ -191,8 +211,8 @@ impl Product<'_> {
         let is_safe = |id: ConfigId| self.worlds.configuration(id).is_some_and(|c| c.safe);
         let mut begun: SmallVec<[(u32, SmallVec<[Request; 2]>); 2]> = SmallVec::new();
         if batch.requests.iter().any(|request| matches!(request.ask, Ask::Apply(id) if is_safe(id))) {
-            let turns: SmallVec<[Turn; 2]> = state.desk.under_way().iter().cloned().collect();
-            for Turn { number, batch, .. } in turns {
+            let active_batches: SmallVec<[ActiveBatch; 2]> = state.desk.under_way().iter().cloned().collect();
+            for ActiveBatch { number, batch, .. } in active_batches {
                 let planned = state.planned(number);
                 if self.worlds.top(planned).is_none() {
                     let beside = Self::as_begun(&state, number);
@@ -229,10 +249,10 @@ impl Product<'_> {
     }
 
     /// A safe configuration interrupts what is under way.
-    fn interrupts(&self, state: &mut State, request: Request) {
-        for turn in state.desk.under_way() {
-            if state.interrupted.iter().all(|of| of.number != turn.number) {
-                let (number, given_up) = (turn.number, turn.given_up.len());
+    fn interrupts(&self, state: &mut ProductState, request: Request) {
+        for active in state.desk.under_way() {
+            if state.interrupted.iter().all(|of| of.number != active.number) {
+                let (number, given_up) = (active.number, active.given_up.len());
                 state.interrupted.push(Interrupted { number, planned: state.world, given_up });
             }
         }
@@ -244,12 +264,12 @@ impl Product<'_> {
     }
 
     /// What is under way is given up by its own undo.
-    fn give_up(&mut self, state: &mut State, number: u32, undo: Request) {
+    fn give_up(&mut self, state: &mut ProductState, number: u32, undo: Request) {
         let Some(place) = state.desk.give_up(number, undo) else {
             // Another undo of the same step has given it up already.
             return self.due(state, undo, Verdict::Undone);
         };
-        let requests = state.desk.turn_of(number).map(|turn| turn.batch.requests.clone()).unwrap_or_default();
+        let requests = state.desk.active(number).map(|active| active.batch.requests.clone()).unwrap_or_default();
         // What was interrupted was planned before that.
         let planned = state.planned(number);
         let begun = match self.worlds.top(planned) {
@@ -271,17 +291,17 @@ impl Product<'_> {
     }
 
     /// What stands behind in its batch, has not begun and was given up, is cancelled.
-    pub(super) fn cancel_behind(&self, state: &mut State, number: u32, place: usize) {
-        let request = state.desk.turn_of(number).and_then(|turn| turn.batch.requests.get(place)).copied();
+    pub(super) fn cancel_behind(&self, state: &mut ProductState, number: u32, place: usize) {
+        let request = state.desk.active(number).and_then(|active| active.batch.requests.get(place)).copied();
         let gone = state.desk.answered(number, place, Some(Verdict::Cancelled));
         request.into_iter().for_each(|request| self.due(state, request, Verdict::Cancelled));
         gone.undone.into_iter().for_each(|(undo, verdict)| self.due(state, undo, verdict));
     }
 
     /// An answer is on its way, if anybody waits for it (or all are to be given).
-    fn due(&self, state: &mut State, request: Request, verdict: Verdict) {
+    fn due(&self, state: &mut ProductState, request: Request, verdict: Verdict) {
         let listens = |number: usize| {
-            let event = self.members[number].chart.event(verdict.event(request.ask));
+            let event = self.members[number].answer(request.ask, verdict);
             is_for_somebody(&request) && event != EventId::OTHER
         };
         if self.tells_all || self.member(request.requester).is_some_and(listens) {
@@ -290,7 +310,7 @@ impl Product<'_> {
     }
 
     /// A request is taken up: who asks is not down any more.
-    fn owed(&self, state: &mut State, request: &Request) {
+    fn owed(&self, state: &mut ProductState, request: &Request) {
         if request.why == Why::Asked
             && let Some(number) = self.member(request.requester)
         {
@@ -299,27 +319,28 @@ impl Product<'_> {
     }
 
     /// The next batch that may begin.
-    fn turn(&self, state: &mut State) -> Option<Turn> {
-        let State { desk, world, leaving, .. } = state;
+    fn begin_next(&self, state: &mut ProductState) -> Option<ActiveBatch> {
+        let ProductState { desk, world, leaving, .. } = state;
+        desk.waiting().next()?;
         let alone = |batch: &Batch| *leaving && self.worlds.goes_alone(*world, batch);
-        desk.turn(&self.worlds.claims, alone).cloned()
+        desk.begin_next(&self.worlds.claims, alone).cloned()
     }
 
     /// Whatever can begin does; nothing while a safe configuration is being applied.
-    pub(super) fn begin(&mut self, state: &mut State) {
+    pub(super) fn begin(&mut self, state: &mut ProductState) {
         if !state.safe.is_empty() {
             return;
         }
-        while let Some(turn) = self.turn(state) {
-            let first = turn.batch.requests[0];
+        while let Some(active) = self.begin_next(state) {
+            let first = active.batch.requests[0];
             if first.why != Why::Down {
-                for request in &turn.batch.requests {
+                for request in &active.batch.requests {
                     self.owed(state, request);
                 }
-                self.takes_place(state, turn.number);
+                self.takes_place(state, active.number);
                 continue;
             }
-            state.desk.over(turn.number);
+            state.desk.over(active.number);
             if let Some(number) = self.member(first.requester) {
                 state.down |= bit(number);
             }
@@ -337,13 +358,13 @@ impl Product<'_> {
     }
 
     /// A batch under way begins, or the rest of it: a push takes its place on the stack then, or finds none.
-    pub(super) fn takes_place(&mut self, state: &mut State, number: u32) {
+    pub(super) fn takes_place(&mut self, state: &mut ProductState, number: u32) {
         // What is over, however that came, has no place, and its number is another's.
-        let State { placed, joined, desk, .. } = &mut *state;
-        placed.retain(|of| *of != number && desk.turn_of(*of).is_some());
-        joined.retain(|of| desk.turn_of(*of).is_some());
-        let turn = state.desk.under_way().iter().find(|turn| turn.number == number);
-        let Some(requests) = turn.map(|turn| turn.batch.requests.clone()) else { return };
+        let ProductState { placed, joined, desk, .. } = &mut *state;
+        placed.retain(|of| *of != number && desk.active(*of).is_some());
+        joined.retain(|of| desk.active(*of).is_some());
+        let active = state.desk.under_way().iter().find(|active| active.number == number);
+        let Some(requests) = active.map(|active| active.batch.requests.clone()) else { return };
         if self.worlds.is_tight(state.world, &requests)
             && !self.comes(state, number, &requests).refused.iter().any(|(_, why)| is_for_room(why))
         {
@@ -352,7 +373,7 @@ impl Product<'_> {
     }
 
     /// Puts an event into the inbox of everybody but the one that emits it.
-    pub(super) fn spread(&mut self, state: &mut State, name: EventName, but: Option<usize>) {
+    pub(super) fn spread(&mut self, state: &mut ProductState, name: EventName, but: Option<usize>) {
         for number in 0..self.members.len() {
             let member = &mut self.members[number];
             let event = member.chart.event(name);
@@ -378,7 +399,7 @@ impl Product<'_> {
 
     /// Frames that waited for this event have been confirmed; perhaps, where it may be too late and what takes one back waits
     /// its turn.
-    pub(super) fn confirm(&self, state: &mut State, name: EventName) {
+    pub(super) fn confirm(&self, state: &mut ProductState, name: EventName) {
         if !state.desk.is_empty() && !self.tells_all {
             return;
         }
@@ -391,30 +412,30 @@ impl Product<'_> {
     }
 
     /// Gives answers, one after the other; each is heard before the next comes.
-    pub(super) fn tell(&mut self, mut state: State, answers: Answers, failed: Failed, nexts: &mut Nexts) {
+    pub(super) fn tell(&mut self, mut state: ProductState, answers: Answers, failed: Failed, nexts: &mut Nexts) {
         self.begin(&mut state);
         // Those that are still to be heard lie with the state: who would hear them may be left by hearing those before.
         state.telling.extend(answers.iter().copied());
         if self.tells_all && self.members.len() > 1 {
             // Each hears it in its own time: what another one asks for meanwhile may come first.
             state.telling.retain(|(request, _)| is_for_somebody(request));
-            let states = if state.flight.is_empty() { SmallVec::from_iter([state]) } else { self.lands(state) };
+            let states = if state.in_transit.is_empty() { one(state) } else { self.lands(state) };
             for state in states {
                 let state = self.settle(state);
                 nexts.all.push(Next::answered(Move::Answer, answers.clone(), state, failed));
             }
             return;
         }
-        // What is in flight may come between what begins now and what is heard now.
-        let mut states = if state.flight.is_empty() { vec![state] } else { self.lands(state).into_vec() };
+        // What is in transit may come between what begins now and what is heard now.
+        let mut states = if state.in_transit.is_empty() { one(state) } else { self.lands(state) };
         for _ in 0..answers.len() {
-            let mut heard = Vec::with_capacity(states.len());
+            let mut heard = States::new();
             for mut state in states {
                 let (request, verdict) = state.telling.remove(0);
                 let owner = self.member(request.requester).filter(|_| is_for_somebody(&request));
                 match owner {
                     Some(number) => {
-                        let event = self.members[number].chart.event(verdict.event(request.ask));
+                        let event = self.members[number].answer(request.ask, verdict);
                         nexts.troubles.extend(self.unheard_revert(&state, number, &request, verdict));
                         heard.extend(self.react(state, number, event));
                     }

@@ -4,10 +4,11 @@
 //! What a simulated component reports after a step (`simulated: { reactions }`) comes once. It is still to come where every way
 //! since that step was quick, or led through places alone that would have heard it.
 
+use super::adjacency::Adjacency;
 use super::explore::{Barred, Edge, Graph};
-use super::state::{Failed, Move};
+use super::state::Move;
 use crate::model::monitor::MONITORS_TYPE;
-use crate::model::{EventName, Monitor, RunState, StepPattern, Value};
+use crate::model::{EventName, Monitor, RunState, Value};
 use crate::system::View;
 use rustc_hash::FxHashMap;
 use std::collections::BTreeMap;
@@ -63,16 +64,14 @@ impl Graph<'_, '_> {
 
     /// These states, and where such edges lead from them.
     pub(super) fn spread_from(&self, mut open: Vec<u32>, leads: impl Fn(usize, &Edge) -> bool) -> Vec<bool> {
-        let mut out: Vec<Vec<u32>> = vec![Vec::new(); self.states.len()];
-        for (_, edge) in self.edges.iter().enumerate().filter(|(number, edge)| leads(*number, edge)) {
-            out[edge.from as usize].push(edge.to);
-        }
+        let edges = self.edges.iter().enumerate().filter(|(number, edge)| leads(*number, edge));
+        let out = Adjacency::new(self.states.len(), edges.map(|(_, edge)| (edge.from, edge.to)));
         let mut reached = vec![false; self.states.len()];
         // Where a coordinator cannot be entered there are none.
         open.retain(|at| (*at as usize) < self.states.len());
         while let Some(at) = open.pop() {
             if !std::mem::replace(&mut reached[at as usize], true) {
-                open.extend(&out[at as usize]);
+                open.extend(out.of(at));
             }
         }
         reached
@@ -114,8 +113,10 @@ impl Graph<'_, '_> {
         let mut comes = vec![false; self.states.len()];
         let deployment = self.product.deployment;
         let names: Vec<EventName> = self.product.alike_to(u16::try_from(at).unwrap_or(u16::MAX)).collect();
-        let in_time = deployment.reactions.iter().filter(|reaction| reaction.delay < deployment.shutdown.within);
-        let raising: Vec<_> = in_time.filter(|reaction| names.contains(&reaction.raise)).collect();
+        let reactions = deployment.reactions.iter().enumerate();
+        let in_time = reactions.filter(|(_, reaction)| reaction.delay < deployment.shutdown.within);
+        let raising: Vec<usize> =
+            in_time.filter(|(_, reaction)| names.contains(&reaction.raise)).map(|(at, _)| at).collect();
         if !deployment.kind.imitates || raising.is_empty() {
             return comes;
         }
@@ -125,35 +126,15 @@ impl Graph<'_, '_> {
             hears.push(members.into_iter().any(|(member, leaf)| member.takes(*leaf, names[0])));
         }
         for reaction in raising {
-            let set_off = self.edges_with(0..self.edges.len(), &StepPattern::new(&reaction.after));
+            let set_off = |number: usize| self.sets_off(number, reaction);
             let is_it = |edge: &Edge| matches!(edge.by, Move::Event(by) if usize::from(by) == at);
             let passes = |(number, edge): &(usize, &Edge)| {
-                !set_off[*number] && (is_it(edge) || !edge.quiet && !hears[edge.from as usize])
+                !set_off(*number) && (is_it(edge) || !edge.quiet && !hears[edge.from as usize])
             };
             let gone = self.edges.iter().enumerate().filter(passes).map(|(_, edge)| edge.to);
-            let gone = self.spread_from(gone.chain([0]).collect(), |number, _| !set_off[number]);
+            let gone = self.spread_from(gone.chain([0]).collect(), |number, _| !set_off(number));
             comes.iter_mut().zip(gone).for_each(|(comes, gone)| *comes |= !gone);
         }
         comes
-    }
-
-    /// Of these edges those on which such a step is done, as far as nothing fails.
-    pub(super) fn edges_with(&mut self, some: impl Iterator<Item = usize>, pattern: &StepPattern) -> Vec<bool> {
-        let mut with = vec![false; self.edges.len()];
-        let mut of: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
-        for (number, edge) in some.map(|number| (number, &self.edges[number])) {
-            if edge.by == Move::Answer && edge.failed == Failed::Nothing {
-                of.entry(edge.from).or_default().push(number);
-            }
-        }
-        for (from, numbers) in of {
-            let state = self.states[from as usize].clone();
-            let nexts = self.nexts(from).all;
-            for number in numbers {
-                let next = self.edges[number].place.and_then(|place| nexts.get(place as usize));
-                with[number] = next.is_some_and(|next| self.product.does_step(&state, next, pattern));
-            }
-        }
-        with
     }
 }

@@ -5,7 +5,7 @@
 use super::explore::Barred;
 use super::product::Product;
 use super::reactions::triggers;
-use super::state::{Move, State};
+use super::state::{Move, ProductState};
 use crate::model::{Ask, EventName, FAULTED, Monitor, Verdict};
 use crate::statechart::EventId;
 
@@ -59,7 +59,7 @@ impl Product<'_> {
     }
 
     /// Events that would lead on from a state, were they not refused while the deployment is being stopped.
-    pub(super) fn closed_at(&self, state: &State) -> Vec<EventName> {
+    pub(super) fn closed_at(&self, state: &ProductState) -> Vec<EventName> {
         let leads = |(at, _): &(usize, &EventName)| {
             let by = Move::Event(u16::try_from(*at).unwrap_or(u16::MAX));
             !self.is_first_or_last(by) && self.raises_while_stopping(by) == Raises::Nobody

@@ -1,6 +1,6 @@
 //! What a batch comes to in a world: asked of the stack once, and followed to each end that it may have.
 
-use super::outcome::{Beside, Comes, Went, WorldId};
+use super::outcome::{Comes, ConcurrentWork, Went, WorldId};
 use super::stands::never;
 use super::world::{Worlds, plain};
 use crate::model::{Ask, Findings};
@@ -14,26 +14,26 @@ use std::sync::Arc;
 
 impl Worlds<'_> {
     /// What the rest of a batch comes to in a world that is known.
-    pub fn comes(&mut self, id: WorldId, requests: &[Request], beside: &Beside) -> Rc<Comes> {
-        let key = (id, plain(requests), beside.clone());
+    pub fn comes(&mut self, id: WorldId, requests: &[Request], concurrent: &ConcurrentWork) -> Rc<Comes> {
+        let key = (id, plain(requests), concurrent.clone());
         if let Some(known) = self.comes.get(&key) {
             return known.clone();
         }
-        let comes = Rc::new(self.work_out(id, &key.1, beside));
+        let comes = Rc::new(self.work_out(id, &key.1, concurrent));
         self.comes.insert(key, comes.clone());
         comes
     }
 
     /// The first requests of a batch, as the stack decides.
-    pub fn group(&self, id: WorldId, requests: &[Request], beside: &Beside) -> Option<Group> {
-        let Beside { held, joined, placed, alone } = beside;
+    pub fn group(&self, id: WorldId, requests: &[Request], concurrent: &ConcurrentWork) -> Option<Group> {
+        let ConcurrentWork { held, joined, placed, alone } = concurrent;
         let rules = Rules { held, joined: *joined, placed: *placed, alone: *alone, ..self.rules() };
         self.get(id).map(|world| take_up(world, requests, &rules))
     }
 
-    fn work_out(&mut self, id: WorldId, requests: &[Request], beside: &Beside) -> Comes {
+    fn work_out(&mut self, id: WorldId, requests: &[Request], concurrent: &ConcurrentWork) -> Comes {
         self.asked.extend(requests.iter().filter_map(|r| if let Ask::Apply(id) = r.ask { Some(id) } else { None }));
-        let mut group = self.group(id, requests, beside).unwrap_or_default();
+        let mut group = self.group(id, requests, concurrent).unwrap_or_default();
         let refused = group.told.iter().filter_map(|told| {
             let reasons = match told.reason.as_ref()? {
                 Reason::Overtaken | Reason::GivenUp | Reason::SafeCame(_) => return None,
@@ -47,7 +47,8 @@ impl Worlds<'_> {
         let warnings = planned.as_ref().map(|planned| planned.warnings.clone()).filter(|warnings| !warnings.is_empty());
         let warnings = warnings.map(Rc::new);
         let can_fail = planned.as_ref().map(can_fail).unwrap_or_default();
-        let mut ends = |endings: &[Ending]| self.after(id, requests, &group, planned.as_ref(), endings, &beside.held);
+        let mut ends =
+            |endings: &[Ending]| self.after(id, requests, &group, planned.as_ref(), endings, &concurrent.held);
         let parts = can_fail.len();
         let until = |part: usize, ending: Ending| -> Endings {
             let of = |at: usize| {
@@ -114,8 +115,8 @@ impl Worlds<'_> {
     }
 
     /// The steps of a group, for who shows them.
-    pub fn steps(&self, id: WorldId, requests: &[Request], beside: &Beside) -> Vec<PlannedStep> {
-        self.group(id, requests, beside)
+    pub fn steps(&self, id: WorldId, requests: &[Request], concurrent: &ConcurrentWork) -> Vec<PlannedStep> {
+        self.group(id, requests, concurrent)
             .and_then(|group| group.planned)
             .map_or_else(Vec::new, |planned| Arc::unwrap_or_clone(planned.steps))
     }

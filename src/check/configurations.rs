@@ -10,7 +10,7 @@ use crate::limits;
 use crate::model::{
     Change, ChangeKind, ComponentName, ConfigId, Configuration, Deployment, Findings, Origin, Target, TypeName,
 };
-use crate::plan::Context;
+use crate::plan::PlanContext;
 use crate::plan::meant::Meant;
 use crate::system::{Picture, Violation, either};
 use smallvec::SmallVec;
@@ -23,7 +23,7 @@ pub fn check(deployment: &Deployment, universe: &Universe) -> Findings {
 
 /// What is wrong with these configurations by themselves.
 pub fn some(deployment: &Deployment, universe: &Universe, ids: &[ConfigId]) -> Findings {
-    let mut check = Check { universe, context: Context::of(deployment), findings: Vec::new() };
+    let mut check = ConfigurationCheck { universe, context: PlanContext::of(deployment), findings: Vec::new() };
     for configuration in deployment.configurations.iter().filter(|c| ids.contains(&c.id)) {
         check.configuration(configuration);
     }
@@ -31,25 +31,25 @@ pub fn some(deployment: &Deployment, universe: &Universe, ids: &[ConfigId]) -> F
 }
 
 /// A component of a change, and one of the ways in which it may have been created.
-type Part<'a> = (ComponentName, &'a Creation);
+type ChangedComponent<'a> = (ComponentName, &'a Creation);
 
 /// A change names two components at most.
-type Parts<'a> = SmallVec<[Part<'a>; 2]>;
+type ChangedComponents<'a> = SmallVec<[ChangedComponent<'a>; 2]>;
 
 /// A combination of such ways, and the violations that a change then has.
 struct Case<'a> {
-    parts: Parts<'a>,
+    parts: ChangedComponents<'a>,
     picture: Picture<'a>,
     found: Vec<Violation>,
 }
 
-struct Check<'a> {
+struct ConfigurationCheck<'a> {
     universe: &'a Universe,
-    context: Context,
+    context: PlanContext,
     findings: Findings,
 }
 
-impl<'a> Check<'a> {
+impl<'a> ConfigurationCheck<'a> {
     fn configuration(&mut self, configuration: &Configuration) {
         for (list, entries) in [("pre_conf_state", &configuration.pre), ("post_conf_state", &configuration.post)] {
             let path = |i: usize| format!("configurations.{}.{list}[{i}]", configuration.id);
@@ -104,11 +104,11 @@ impl<'a> Check<'a> {
 }
 
 /// Every combination of the ways in which the components may have been created; of no components the one of nothing.
-fn combinations<'a>(ways: &[(ComponentName, Creations<'a>)]) -> impl Iterator<Item = Parts<'a>> {
+fn combinations<'a>(ways: &[(ComponentName, Creations<'a>)]) -> impl Iterator<Item = ChangedComponents<'a>> {
     let all: usize = ways.iter().map(|(_, creations)| creations.len()).product();
     (0..all).map(move |mut number| {
         // The ways of the last component change fastest.
-        let mut parts: Parts<'a> = SmallVec::new();
+        let mut parts: ChangedComponents<'a> = SmallVec::new();
         for (component, creations) in ways.iter().rev() {
             parts.push((*component, creations[number % creations.len()]));
             number /= creations.len();
@@ -180,7 +180,7 @@ fn several<'a>(cases: &[Case<'a>]) -> Vec<(ComponentName, Vec<&'a Creation>)> {
     all
 }
 
-fn created_as((component, creation): &Part<'_>) -> String {
+fn created_as((component, creation): &ChangedComponent<'_>) -> String {
     format!("`{component}` is created here as {}", creation.ty)
 }
 

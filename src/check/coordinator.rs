@@ -7,7 +7,7 @@ use crate::model::codes::{
 use crate::model::finding::{closest, did_you_mean, nearest};
 use crate::model::statechart::is_internal;
 use crate::model::{Ask, ConfigId, Deployment, EventName, FAULTED, Finding, Findings, Monitor, Raise, Verdict};
-use crate::statechart::{Chart, EdgeId, EventId, NodeId, When};
+use crate::statechart::{Chart, EdgeId, EventId, NodeId, RaiseMoment};
 use std::collections::BTreeSet;
 
 /// What a raised name asks for; none when it is no request.
@@ -110,7 +110,7 @@ fn raised(deployment: &Deployment, chart: &Chart, findings: &mut Findings) {
             Raise::Event => emits.contains(&site.name),
         };
         // The undo of a state-scoped configuration was not written by anybody; its entry is reported.
-        if known || (site.scoped && matches!(site.when, When::Exit(_))) {
+        if known || (site.scoped && matches!(site.when, RaiseMoment::Exit(_))) {
             continue;
         }
         let (id, undo) = site.name.as_str().strip_suffix(".undo").map_or((site.name.as_str(), ""), |id| (id, ".undo"));
@@ -268,11 +268,11 @@ pub fn edges(chart: &Chart) -> impl Iterator<Item = EdgeId> + '_ {
 }
 
 /// Where a name is raised, as a path of the model.
-pub fn place(chart: &Chart, when: When) -> String {
+pub fn place(chart: &Chart, when: RaiseMoment) -> String {
     match when {
-        When::Entry(node) => format!("coordinator.{}.entry", chart.fqn(node)),
-        When::Exit(node) => format!("coordinator.{}.exit", chart.fqn(node)),
-        When::Effect(edge) => {
+        RaiseMoment::Entry(node) => format!("coordinator.{}.entry", chart.fqn(node)),
+        RaiseMoment::Exit(node) => format!("coordinator.{}.exit", chart.fqn(node)),
+        RaiseMoment::Effect(edge) => {
             let (from, to): (NodeId, NodeId) = chart.ends(edge);
             format!("coordinator.{} -> {}", chart.fqn(from), chart.fqn(to))
         }

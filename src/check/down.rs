@@ -1,11 +1,12 @@
 //! Whether every way leads down, and what it leaves behind.
 
+use super::adjacency::Adjacency;
 use super::closed::{fails, still_comes};
 use super::explore::{Barred, Edge, Graph};
 use super::judge::Traced;
 use super::members::Member;
 use super::product::Product;
-use super::state::{Failed, Move, State};
+use super::state::{Failed, Move, ProductState};
 use crate::model::codes::{COORD_LEFTOVERS, COORD_NO_WAY_DOWN};
 use crate::model::{ComponentName, Finding, Severity};
 use crate::statechart::{EventId, NodeId};
@@ -16,7 +17,7 @@ use std::collections::VecDeque;
 impl Graph<'_, '_> {
     /// Ways down that leave something behind.
     pub(super) fn leftovers(&mut self, found: &mut Traced) {
-        let left = |state: &State| left_in(self.product, state);
+        let left = |state: &ProductState| left_in(self.product, state);
         let some = (0u32..).zip(&self.states).filter(|(_, state)| !left(state).is_empty());
         let some = some.map(|(at, _)| at).collect();
         let Some(at) = self.best_first(some).first().copied() else { return };
@@ -73,16 +74,15 @@ impl Graph<'_, '_> {
 
     /// From which states such edges lead to *down*, or to where it is not followed, or to nothing that is known.
     fn reaching_down(&self, counts: impl Fn(usize, &Edge) -> bool) -> Vec<bool> {
-        let mut before: Vec<Vec<u32>> = vec![Vec::new(); self.states.len()];
         let edges = self.edges.iter().enumerate().filter(|(number, edge)| counts(*number, edge));
-        edges.for_each(|(_, edge)| before[edge.to as usize].push(edge.from));
-        let forced = |state: &State| self.product.worlds.top(state.world).is_some();
+        let before = Adjacency::new(self.states.len(), edges.map(|(_, edge)| (edge.to, edge.from)));
+        let forced = |state: &ProductState| self.product.worlds.top(state.world).is_some();
         let mut reaches = self.arrives();
         // What the broken ends lead to is taken away by force: that is no way down of an intact system.
         let mut open: Vec<u32> = (0u32..).zip(&reaches).filter(|(_, reaches)| **reaches).map(|(at, _)| at).collect();
         open.retain(|at| !forced(&self.states[*at as usize]));
         while let Some(at) = open.pop() {
-            for from in &before[at as usize] {
+            for from in before.of(at) {
                 if !std::mem::replace(&mut reaches[*from as usize], true) {
                     open.push(*from);
                 }
@@ -107,7 +107,7 @@ impl Graph<'_, '_> {
 
     /// Which states are *down*, or what is in force there is taken away by force, or they are not followed further, or nothing is known of them.
     pub(super) fn arrives(&self) -> Vec<bool> {
-        let of = |(state, followed): (&State, &bool)| {
+        let of = |(state, followed): (&ProductState, &bool)| {
             !followed || self.product.is_down(state) || self.product.worlds.top(state.world).is_some()
         };
         let mut arrives: Vec<bool> = self.states.iter().zip(&self.followed).map(of).collect();
@@ -139,7 +139,7 @@ impl Graph<'_, '_> {
         let begun = self.edges.iter().filter(|edge| !stops(edge.from) && stops(edge.to)).map(|edge| edge.to);
         let begun: Vec<u32> = begun.collect();
         // What came just before is overtaken by the event that ends the deployment, and heard behind it. Where that leads nowhere
-        // it is told as unheard.
+        // it is told as unhandled.
         let heard = self.edges.iter().filter(|edge| !stops(edge.from) && stops(edge.to) && !edge.dropped);
         let heard = heard.map(|edge| edge.to).collect();
         let stale = self.spread_from(heard, |number, edge| stops(edge.to) && bars[number] == Some(Barred::Closed));
@@ -259,7 +259,7 @@ impl Graph<'_, '_> {
 }
 
 /// What is left in a state in which all are down.
-fn left_in(product: &Product<'_>, state: &State) -> Vec<ComponentName> {
+fn left_in(product: &Product<'_>, state: &ProductState) -> Vec<ComponentName> {
     let mut names = Vec::new();
     if let Some(world) = product.worlds.get(state.world).filter(|_| product.is_down(state)) {
         world.system.for_each_component(&mut |node| names.push(node.name));

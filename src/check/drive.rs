@@ -4,15 +4,15 @@
 //! Where nothing is waited for but events of components or operators, the shortest series of events is taken that leads
 //! to the goal.
 
-use super::beside;
 use super::closed::Raises;
+use super::coupling;
 use super::effort::Far;
 use super::lasts::{Soonest, soonest};
 use super::members::Member;
 use super::outcome::Held;
 use super::product::Product;
 use super::shows::goes;
-use super::state::{Failed, Move, Next, State};
+use super::state::{Failed, Move, Next, ProductState};
 use super::timers::{Waits, takes};
 use super::tried::{Goal, Tried, Way};
 use crate::limits;
@@ -25,7 +25,7 @@ use std::collections::VecDeque;
 
 /// One thing that happens on the way.
 #[derive(Debug, Clone)]
-pub enum Happening {
+pub enum WayEvent {
     /// An event comes from outside, or time passes.
     Event {
         /// The coordinator that hears it.
@@ -52,7 +52,7 @@ pub enum Happening {
 #[derive(Debug, Clone)]
 pub struct Drive {
     /// What happens, in order.
-    pub happenings: Vec<Happening>,
+    pub happenings: Vec<WayEvent>,
     /// Whether it arrives.
     pub reached: bool,
     /// The coordinator that does not arrive; when all do, the last.
@@ -79,7 +79,7 @@ impl Product<'_> {
     /// With `waits` told it is what comes first.
     pub(super) fn by_itself(
         &mut self,
-        state: &State,
+        state: &ProductState,
         waits: Option<&Waits>,
     ) -> Result<Option<Next>, (Request, Findings)> {
         if let Some(turn) = state.desk.under_way().first().filter(|_| state.safe.is_empty() && state.due.is_empty()) {
@@ -110,13 +110,13 @@ impl Product<'_> {
     /// where something takes time.
     pub(super) fn rest(
         &mut self,
-        state: State,
+        state: ProductState,
         goal: Goal,
         moves: &mut Vec<Next>,
         mut waits: Option<&mut Waits>,
-    ) -> Result<State, (Request, Findings)> {
+    ) -> Result<ProductState, (Request, Findings)> {
         let mut state = state;
-        let mut seen: FxHashSet<State> = FxHashSet::default();
+        let mut seen: FxHashSet<ProductState> = FxHashSet::default();
         for _ in 0..limits::CHECK_DRIVEN {
             if state.is_at_rest() && self.all_in(&state, goal) || state.waiting() > limits::CHECK_PILED {
                 break;
@@ -144,7 +144,7 @@ impl Product<'_> {
     }
 
     /// What comes first, or later.
-    pub(super) fn outside_moves(&mut self, state: &State, tried: &Tried, first: bool) -> Vec<Next> {
+    pub(super) fn outside_moves(&mut self, state: &ProductState, tried: &Tried, first: bool) -> Vec<Next> {
         let all = self.nexts(state).all;
         let fits = |next: &Next| match next.by {
             Move::Event(at) => {
@@ -167,7 +167,7 @@ impl Product<'_> {
 
 /// The shortest way from `from` to where all are inside the goal with nothing waiting, every request answered *ok*; where that
 /// has too little time, or waits for what another time comes before, the one that lasts shortest. When there is none, the way to where it stops.
-fn way(product: &mut Product<'_>, from: State, tried: &Tried, goal: Goal) -> Way {
+fn way(product: &mut Product<'_>, from: ProductState, tried: &Tried, goal: Goal) -> Way {
     let mut way = timely(product, from, tried, goal);
     if product.comes_elsewhere(&way.moves) {
         product.unordered |= way.reached;
@@ -176,7 +176,7 @@ fn way(product: &mut Product<'_>, from: State, tried: &Tried, goal: Goal) -> Way
     way
 }
 
-fn timely(product: &mut Product<'_>, from: State, tried: &Tried, goal: Goal) -> Way {
+fn timely(product: &mut Product<'_>, from: ProductState, tried: &Tried, goal: Goal) -> Way {
     let mut way = shortest(product, from, tried, goal);
     if !way.reached {
         // What has to stand for a time may be overtaken.
@@ -206,9 +206,9 @@ fn timely(product: &mut Product<'_>, from: State, tried: &Tried, goal: Goal) -> 
     way
 }
 
-fn shortest(product: &mut Product<'_>, from: State, tried: &Tried, goal: Goal) -> Way {
-    let mut states: Vec<(State, Option<usize>, Vec<Next>)> = Vec::new();
-    let mut index: FxHashSet<State> = FxHashSet::default();
+fn shortest(product: &mut Product<'_>, from: ProductState, tried: &Tried, goal: Goal) -> Way {
+    let mut states: Vec<(ProductState, Option<usize>, Vec<Next>)> = Vec::new();
+    let mut index: FxHashSet<ProductState> = FxHashSet::default();
     let mut queue: VecDeque<usize> = VecDeque::new();
     let mut refused: Option<(usize, Vec<Next>, (Request, Findings))> = None;
     let mut failed: Option<(usize, Vec<Next>, usize)> = None;
@@ -265,10 +265,10 @@ fn shortest(product: &mut Product<'_>, from: State, tried: &Tried, goal: Goal) -
 
 /// How the coordinators come to rest by what they ask for by themselves, before anybody wants them up. Where they go round
 /// for ever: to where on that round one listens to who wants them up.
-fn settled(product: &mut Product<'_>, start: &State) -> Vec<Next> {
+fn settled(product: &mut Product<'_>, start: &ProductState) -> Vec<Next> {
     let wanted = product.deployment.deploy.event;
     let mut way: Vec<Next> = Vec::new();
-    let mut seen: FxHashMap<State, usize> = std::iter::once((start.clone(), 0)).collect();
+    let mut seen: FxHashMap<ProductState, usize> = std::iter::once((start.clone(), 0)).collect();
     loop {
         let last = way.last().map_or(start, |next| &next.state).clone();
         if last.waiting() > limits::CHECK_PILED || way.len() >= limits::CHECK_DRIVEN {
@@ -324,7 +324,7 @@ pub fn drive(deployment: &Deployment, catalogue: &Catalogue, until: Until) -> Op
     let charts = charts?;
     let charts: Vec<&Chart> = charts.iter().collect();
     let numbers: Vec<usize> = (0..charts.len()).collect();
-    let views: Vec<Deployment> = numbers.iter().filter_map(|n| beside::view(deployment, &charts, *n)).collect();
+    let views: Vec<Deployment> = numbers.iter().filter_map(|n| coupling::view(deployment, &charts, *n)).collect();
     let mut product = Product::new(deployment, &views, &charts, &numbers, catalogue);
     product.operator.clear();
     let (rise, fall) = ways(&mut product)?;
@@ -351,12 +351,12 @@ pub fn drive(deployment: &Deployment, catalogue: &Catalogue, until: Until) -> Op
 }
 
 /// What happens on a way.
-fn happenings(product: &Product<'_>, way: &Way) -> Vec<Happening> {
+fn happenings(product: &Product<'_>, way: &Way) -> Vec<WayEvent> {
     let mut happenings = Vec::new();
     let mut before = &way.from;
     for next in &way.moves {
         let state = |number: usize| product.members[number].chart.fqn(next.state.leaves[number]).to_string();
-        let of = |number: usize, event: String| Happening::Event { coordinator: product.members[number].name, event };
+        let of = |number: usize, event: String| WayEvent::Event { coordinator: product.members[number].name, event };
         match next.by {
             Move::Answer => {
                 let requests: Vec<Request> = next.answers.iter().map(|(request, _)| *request).collect();
@@ -364,7 +364,7 @@ fn happenings(product: &Product<'_>, way: &Way) -> Vec<Happening> {
                     && let Some(world) = product.worlds.get(next.state.world)
                     && let Some(member) = product.member(first.requester)
                 {
-                    happenings.push(Happening::Applied {
+                    happenings.push(WayEvent::Applied {
                         coordinator: product.members[member].name,
                         asks: requests.iter().map(|request| request.ask).collect(),
                         steps: product.worlds.steps(before.world, &requests, &goes(before, &requests)),

@@ -1,10 +1,10 @@
-//! Circles of answers in which no time passes and no step fails: who is on one goes round for ever.
+//! Cycles of answers in which no time passes and no step fails: who is on one goes round for ever.
 //!
 //! They are looked for among all such moves at once, so that none is too long to be found.
 
 use super::explore::{Edge, Graph};
 use super::judge::Traced;
-use super::state::{Failed, Move, Next, State};
+use super::state::{Failed, Move, Next, ProductState};
 use crate::limits;
 use crate::model::codes::COORD_ENDLESS;
 use crate::model::{Finding, Severity};
@@ -15,15 +15,15 @@ use rustc_hash::{FxHashMap, FxHashSet};
 use std::collections::VecDeque;
 
 impl Graph<'_, '_> {
-    /// Circles of answers, each told once however it is entered.
+    /// Cycles of answers, each told once however it is entered.
     pub(super) fn endless(&mut self, found: &mut Traced) {
         let mut said: FxHashSet<Vec<(usize, NodeId)>> = FxHashSet::default();
-        for circle in self.circles() {
-            let at = circle[0];
-            let of = self.round_of(&circle);
+        for cycle in self.cycles() {
+            let at = cycle[0];
+            let of = self.round_of(&cycle);
             let leaves = |number: &usize| {
                 let number = *number;
-                circle.iter().map(move |at| (number, *at))
+                cycle.iter().map(move |at| (number, *at))
             };
             let on: Vec<(usize, u32)> = of.iter().flat_map(leaves).collect();
             let leaf = |(number, at): (usize, u32)| (number, self.states[at as usize].leaves[number]);
@@ -35,7 +35,7 @@ impl Graph<'_, '_> {
                 continue;
             }
             let place = |at: &u32| format!("`{}`", self.product.place_of(&self.states[*at as usize], &of));
-            let mut named: Vec<String> = circle.iter().map(place).collect();
+            let mut named: Vec<String> = cycle.iter().map(place).collect();
             named.dedup();
             let more = named.len().saturating_sub(6);
             named.truncate(6);
@@ -53,7 +53,7 @@ impl Graph<'_, '_> {
             )
             .at(self.product.members[of[0]].chart.origin(first))
             .help("wait for an event or for a time (`e_after(1.0)`) somewhere on the way round");
-            let round = self.round(&circle);
+            let round = self.round(&cycle);
             let trace = self.trace_on(at, round);
             found.push((finding, trace));
             // One that is entered from many places is told once.
@@ -63,9 +63,9 @@ impl Graph<'_, '_> {
         }
     }
 
-    /// The moves of a circle, once round.
-    fn round(&mut self, circle: &[u32]) -> Vec<(State, Next)> {
-        let ends: Vec<(u32, u32)> = circle.iter().copied().zip(circle.iter().copied().cycle().skip(1)).collect();
+    /// The moves of a cycle, once round.
+    fn round(&mut self, cycle: &[u32]) -> Vec<(ProductState, Next)> {
+        let ends: Vec<(u32, u32)> = cycle.iter().copied().zip(cycle.iter().copied().cycle().skip(1)).collect();
         let edge = |(from, to): &(u32, u32)| {
             let is = |edge: &Edge| edge.quiet && (edge.from, edge.to) == (*from, *to);
             self.edges.iter().position(is).and_then(|number| u32::try_from(number).ok())
@@ -74,18 +74,18 @@ impl Graph<'_, '_> {
         numbers.into_iter().map(|number| self.gone(number)).collect()
     }
 
-    /// The coordinators that go round on a circle: those that change their state on it, or who hear something on it; one at
+    /// The coordinators that go round on a cycle: those that change their state on it, or who hear something on it; one at
     /// least.
-    fn round_of(&mut self, circle: &[u32]) -> Vec<usize> {
+    fn round_of(&mut self, cycle: &[u32]) -> Vec<usize> {
         let all = 0..self.product.members.len();
         let leaf = |at: u32, number: usize| self.states[at as usize].leaves[number];
-        let moves = |number: &usize| circle.iter().any(|at| leaf(*at, *number) != leaf(circle[0], *number));
+        let moves = |number: &usize| cycle.iter().any(|at| leaf(*at, *number) != leaf(cycle[0], *number));
         let moving: Vec<usize> = all.clone().filter(moves).collect();
         if !moving.is_empty() || all.len() < 2 {
             return if moving.is_empty() { vec![0] } else { moving };
         }
         let mut hearing: Vec<usize> = Vec::new();
-        let on: FxHashSet<(u32, u32)> = circle.iter().copied().zip(circle.iter().copied().cycle().skip(1)).collect();
+        let on: FxHashSet<(u32, u32)> = cycle.iter().copied().zip(cycle.iter().copied().cycle().skip(1)).collect();
         let on: Vec<Edge> =
             self.edges.iter().filter(|edge| edge.quiet && on.contains(&(edge.from, edge.to))).copied().collect();
         for edge in on {
@@ -103,9 +103,9 @@ impl Graph<'_, '_> {
         if hearing.is_empty() { vec![0] } else { hearing }
     }
 
-    /// Of all states that lead to each other by quiet moves one circle, from the first of them; the first ones first.
-    fn circles(&self) -> Vec<Vec<u32>> {
-        // Where nothing is known it is not known what is answered, so nothing can be said of circles.
+    /// Of all states that lead to each other by quiet moves one cycle, from the first of them; the first ones first.
+    fn cycles(&self) -> Vec<Vec<u32>> {
+        // Where nothing is known it is not known what is answered, so nothing can be said of cycles.
         let known = |at: u32| self.product.worlds.top(self.states[at as usize].world).is_none();
         let quiet = self.edges.iter().filter(|edge| edge.quiet && known(edge.from) && known(edge.to));
         let quiet = DiGraph::<(), ()>::from_edges(quiet.map(|edge| (edge.from, edge.to)));
@@ -120,26 +120,26 @@ impl Graph<'_, '_> {
         }
         let mut gone_round: FxHashSet<usize> = FxHashSet::default();
         let firsts = self.in_order().into_iter().filter(|at| of.get(at).is_some_and(|of| gone_round.insert(*of)));
-        firsts.filter_map(|at| circle(&quiet, &of, at)).collect()
+        firsts.filter_map(|at| cycle(&quiet, &of, at)).collect()
     }
 }
 
-/// A shortest circle through `at`, of states that all lead to each other.
-fn circle(quiet: &DiGraph<(), ()>, of: &FxHashMap<u32, usize>, at: u32) -> Option<Vec<u32>> {
+/// A shortest cycle through `at`, of states that all lead to each other.
+fn cycle(quiet: &DiGraph<(), ()>, of: &FxHashMap<u32, usize>, at: u32) -> Option<Vec<u32>> {
     let mut from: FxHashMap<u32, u32> = FxHashMap::default();
     let mut queue = VecDeque::from([at]);
     while let Some(state) = queue.pop_front() {
         let next = quiet.neighbors(NodeIndex::from(state)).filter_map(|next| u32::try_from(next.index()).ok());
         for next in next.filter(|next| of.get(next) == of.get(&at)) {
             if next == at {
-                let mut circle = vec![state];
+                let mut cycle = vec![state];
                 let mut back = state;
                 while back != at {
                     back = from[&back];
-                    circle.push(back);
+                    cycle.push(back);
                 }
-                circle.reverse();
-                return Some(circle);
+                cycle.reverse();
+                return Some(cycle);
             }
             from.entry(next).or_insert_with(|| {
                 queue.push_back(next);

@@ -2,7 +2,7 @@
 
 use super::outcome::{Comes, Went, WorldId};
 use super::product::Product;
-use super::state::{Answers, Failed, Move, Next, Nexts, State, Trouble, Unconfirmed};
+use super::state::{Answers, Failed, Move, Next, Nexts, ProductState, Trouble, Unconfirmed};
 use super::world::Top;
 use crate::model::{Ask, Verdict};
 use crate::stack::{Ending, Request, Requester, Settled, Stopped, Why, settle};
@@ -27,12 +27,12 @@ fn given(settled: &Settled) -> SmallVec<[(usize, Option<Verdict>); 2]> {
 }
 
 impl Product<'_> {
-    fn requests(state: &State, number: u32) -> SmallVec<[Request; 2]> {
-        state.desk.turn_of(number).map(|turn| turn.batch.requests.clone()).unwrap_or_default()
+    fn requests(state: &ProductState, number: u32) -> SmallVec<[Request; 2]> {
+        state.desk.active(number).map(|active| active.batch.requests.clone()).unwrap_or_default()
     }
 
     /// How a batch under way may end, or its first requests.
-    pub(super) fn ends(&mut self, state: &State, number: u32, nexts: &mut Nexts) {
+    pub(super) fn ends(&mut self, state: &ProductState, number: u32, nexts: &mut Nexts) {
         let requests = Self::requests(state, number);
         if let Some(top) = self.worlds.top(state.world) {
             return self.ends_somehow(state, number, top, &requests, nexts);
@@ -65,7 +65,7 @@ impl Product<'_> {
     /// The parts of a group under way have ended so, and no safe configuration interrupts them.
     fn ends_so(
         &mut self,
-        state: &State,
+        state: &ProductState,
         number: u32,
         requests: &[Request],
         comes: &Comes,
@@ -80,7 +80,7 @@ impl Product<'_> {
     /// has nothing to do, since something may be in its way.
     fn ends_as_aside(
         &mut self,
-        state: &State,
+        state: &ProductState,
         number: u32,
         requests: &[Request],
         comes: &Comes,
@@ -125,7 +125,7 @@ impl Product<'_> {
     #[expect(clippy::too_many_arguments, reason = "what a group under way is, and how it ended")]
     fn ends_given(
         &mut self,
-        state: &State,
+        state: &ProductState,
         number: u32,
         requests: &[Request],
         comes: &Comes,
@@ -143,7 +143,7 @@ impl Product<'_> {
     }
 
     /// Nothing is known: each request may end in any way, one after the other.
-    fn ends_somehow(&mut self, state: &State, number: u32, top: Top, requests: &[Request], nexts: &mut Nexts) {
+    fn ends_somehow(&mut self, state: &ProductState, number: u32, top: Top, requests: &[Request], nexts: &mut Nexts) {
         let ask = requests[0].ask;
         for verdict in [ask.done(), ask.failed(), ask.broken()] {
             let went = Went::to(self.worlds.answered(top, &requests[0], verdict));
@@ -158,7 +158,7 @@ impl Product<'_> {
     /// Something of a batch under way is left in between.
     fn broke(
         &mut self,
-        state: &State,
+        state: &ProductState,
         number: u32,
         requests: &[Request],
         given: SmallVec<[(usize, Option<Verdict>); 2]>,
@@ -173,7 +173,7 @@ impl Product<'_> {
     }
 
     /// These requests of a batch under way are answered, and the world has become another one.
-    fn ended(&mut self, state: &State, number: u32, requests: &[Request], end: &End<'_>, nexts: &mut Nexts) {
+    fn ended(&mut self, state: &ProductState, number: u32, requests: &[Request], end: &End<'_>, nexts: &mut Nexts) {
         let End { went, given, class } = end;
         let mut next = state.clone();
         self.go(&mut next, went);
@@ -199,11 +199,18 @@ impl Product<'_> {
     }
 
     /// Requests of a batch under way are answered: the rest of it begins, and they are told.
-    fn goes_on_behind(&mut self, mut next: State, number: u32, answers: Answers, class: Failed, nexts: &mut Nexts) {
+    fn goes_on_behind(
+        &mut self,
+        mut next: ProductState,
+        number: u32,
+        answers: Answers,
+        class: Failed,
+        nexts: &mut Nexts,
+    ) {
         // What was given up together with one before it is not taken up anew; where nothing is known it may have begun with it.
         while (!self.tells_all || self.worlds.top(next.world).is_none())
             && let Some(place) =
-                next.desk.turn_of(number).and_then(|turn| turn.given_up.iter().map(|of| of.place).min())
+                next.desk.active(number).and_then(|active| active.given_up.iter().map(|of| of.place).min())
         {
             self.cancel_behind(&mut next, number, place);
         }
@@ -215,7 +222,7 @@ impl Product<'_> {
     }
 
     /// What a request that was carried out leaves to be waited for.
-    fn applied(&self, state: &mut State, request: &Request, verdict: Verdict, went: &Went) {
+    fn applied(&self, state: &mut ProductState, request: &Request, verdict: Verdict, went: &Went) {
         let (Ask::Apply(id), Verdict::Ok) = (request.ask, verdict) else { return };
         state.lost.retain(|lost| *lost != id);
         self.stands_for(state, id);
@@ -232,15 +239,15 @@ impl Product<'_> {
     }
 
     /// How a batch under way that was stopped may end.
-    pub(super) fn stopped_ends(&mut self, state: &State, number: u32, nexts: &mut Nexts) {
+    pub(super) fn stopped_ends(&mut self, state: &ProductState, number: u32, nexts: &mut Nexts) {
         let requests = Self::requests(state, number);
         if requests.is_empty() {
             return;
         }
         // In the order in which they came.
-        let turn = state.desk.turn_of(number);
+        let active = state.desk.active(number);
         let given_up: SmallVec<[usize; 1]> =
-            turn.iter().flat_map(|turn| &turn.given_up).map(|given_up| given_up.place).collect();
+            active.iter().flat_map(|active| &active.given_up).map(|given_up| given_up.place).collect();
         let interrupted = state.interrupted(number);
         let before = interrupted.map_or(given_up.len(), |interrupted| interrupted.given_up.min(given_up.len()));
         let interrupted = interrupted.map(|interrupted| interrupted.planned);
@@ -284,18 +291,18 @@ impl Product<'_> {
     }
 
     /// What stands behind in a batch of which nothing is known, and was given up, had perhaps not begun.
-    pub(super) fn behind_given_up(&self, state: &State, nexts: &mut Nexts) {
+    pub(super) fn behind_given_up(&self, state: &ProductState, nexts: &mut Nexts) {
         if !self.tells_all || self.worlds.top(state.world).is_none() {
             return;
         }
-        for turn in state.desk.under_way() {
+        for active in state.desk.under_way() {
             let mut behind: SmallVec<[usize; 1]> =
-                turn.given_up.iter().map(|given_up| given_up.place).filter(|place| *place > 0).collect();
+                active.given_up.iter().map(|given_up| given_up.place).filter(|place| *place > 0).collect();
             behind.sort_unstable();
             behind.dedup();
             for place in behind {
                 let mut next = state.clone();
-                self.cancel_behind(&mut next, turn.number, place);
+                self.cancel_behind(&mut next, active.number, place);
                 nexts.all.push(Next::plain(Move::Answer, next, Failed::Nothing));
             }
         }
@@ -305,15 +312,15 @@ impl Product<'_> {
     /// from before.
     fn interrupted_ends(
         &mut self,
-        state: &State,
+        state: &ProductState,
         number: u32,
         requests: &[Request],
         planned: WorldId,
         given_up: &[usize],
         nexts: &mut Nexts,
     ) {
-        let beside = Self::as_begun(state, number);
-        let comes = self.worlds.comes(planned, requests, &beside);
+        let concurrent = Self::as_begun(state, number);
+        let comes = self.worlds.comes(planned, requests, &concurrent);
         let parts = comes.group.places.iter().enumerate();
         let given_up: SmallVec<[usize; 2]> =
             parts.filter(|(_, place)| given_up.contains(place)).map(|(part, _)| part).collect();
@@ -333,7 +340,7 @@ impl Product<'_> {
     }
 
     /// How a safe configuration may end.
-    pub(super) fn safe_ends(&mut self, state: &State, at: usize, nexts: &mut Nexts) {
+    pub(super) fn safe_ends(&mut self, state: &ProductState, at: usize, nexts: &mut Nexts) {
         let mut over = state.clone();
         let request = &over.safe.remove(at);
         if let Some(top) = self.worlds.top(state.world) {
@@ -344,8 +351,8 @@ impl Product<'_> {
             }
             return;
         }
-        let beside = self.beside(state, None);
-        let comes = self.worlds.safe(state.world, request, &beside.held);
+        let concurrent = self.concurrent_work(state, None);
+        let comes = self.worlds.safe(state.world, request, &concurrent.held);
         let from = nexts.all.len();
         if !comes.troubles.is_empty() && request.requester != Requester::Operator {
             nexts.troubles.push(Trouble::Refused(*request, comes.troubles.clone()));
@@ -362,7 +369,8 @@ impl Product<'_> {
         nexts.all[from..].iter_mut().for_each(|next| next.deep = (comes.done.deep, comes.done.left));
         // What is under way may have made or changed what it finds, and goes on while it is applied.
         let claim = self.worlds.claims.of([request]);
-        let meets = state.desk.under_way().iter().any(|turn| self.worlds.claims.of(&turn.batch.requests).meets(&claim));
+        let meets =
+            state.desk.under_way().iter().any(|active| self.worlds.claims.of(&active.batch.requests).meets(&claim));
         if comes.may_fail || meets {
             let top = Top { safe: true, actuator: self.worlds.has_actuator(state.world) };
             let mut next = over;
@@ -374,7 +382,14 @@ impl Product<'_> {
         }
     }
 
-    fn safe_told(&mut self, next: State, request: &Request, verdict: Verdict, failed: Failed, nexts: &mut Nexts) {
+    fn safe_told(
+        &mut self,
+        next: ProductState,
+        request: &Request,
+        verdict: Verdict,
+        failed: Failed,
+        nexts: &mut Nexts,
+    ) {
         for next in self.lands(next) {
             self.tell(next, Answers::from_iter([(*request, verdict)]), failed, nexts);
         }

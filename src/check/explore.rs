@@ -5,19 +5,19 @@
 
 use super::bound::Bound;
 use super::effort::{Far, Halt};
+use super::once::Once;
 use super::outcome::WorldId;
 use super::product::Product;
 use super::report::Explored;
-use super::state::{Failed, Move, Next, Nexts, State, Trouble};
+use super::state::{Failed, Move, Next, Nexts, ProductState, Reacts, Trouble};
 use super::world::Top;
 use crate::limits;
 use crate::model::{Ask, ConfigId, Findings, Verdict};
 use crate::stack::Requester;
-use rustc_hash::{FxHashMap, FxHashSet, FxHasher};
-use smallvec::SmallVec;
+use indexmap::IndexSet;
+use rustc_hash::{FxBuildHasher, FxHashMap, FxHashSet};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
-use std::hash::{Hash, Hasher};
 use std::rc::Rc;
 
 /// A move that was followed.
@@ -27,7 +27,7 @@ pub struct Edge {
     pub from: u32,
     /// To where.
     pub to: u32,
-    /// Its place among the moves from there; none: so many rounds of a circle.
+    /// Its place among the moves from there; none: so many rounds of a cycle.
     pub place: Option<u32>,
     /// What leads there.
     pub by: Move,
@@ -63,7 +63,7 @@ pub struct Graph<'p, 'a> {
     /// The product.
     pub product: &'p mut Product<'a>,
     /// The states, in the order they were met.
-    pub states: Vec<State>,
+    pub states: IndexSet<ProductState, FxBuildHasher>,
     /// The worst that failed on the best way to each.
     pub failed: Vec<Failed>,
     /// Whether each was followed further.
@@ -82,16 +82,18 @@ pub struct Graph<'p, 'a> {
     pub bounds: FxHashMap<Bound, Failed>,
     /// Edges that push a frame which nobody ever undoes: of which configuration, and by whom.
     pub(super) pushes: FxHashMap<(ConfigId, Requester), Vec<u32>>,
-    /// In which worlds circles that push one were gone round.
+    /// In which worlds cycles that push one were gone round.
     pub(super) gone_round: FxHashMap<(ConfigId, Requester), FxHashSet<WorldId>>,
     /// Behind undoings that failed only one batch at a time is followed, and no races.
     lean: Option<bool>,
     pub(super) depth: Vec<u32>,
-    index: FxHashMap<u64, SmallVec<[u32; 1]>>,
+    once: Once,
     open: BinaryHeap<Reverse<(Failed, u32, u32)>>,
     /// For each class the shortest ways with nothing worse.
     pub(super) ways: FxHashMap<Failed, Ways>,
-    /// The circles of edges that are gone round where an edge is no move.
+    /// Which steps of the simulated platform's reactions are done on edges on which nothing fails, by the reactions' places.
+    reacts: FxHashMap<u32, Reacts>,
+    /// The cycles of edges that are gone round where an edge is no move.
     pub(super) rounds: FxHashMap<u32, Vec<u32>>,
 }
 
@@ -116,7 +118,7 @@ impl Ways {
 pub fn explore<'p, 'a>(product: &'p mut Product<'a>) -> Graph<'p, 'a> {
     let mut graph = Graph {
         product,
-        states: Vec::new(),
+        states: IndexSet::default(),
         failed: Vec::new(),
         followed: Vec::new(),
         edges: Vec::new(),
@@ -129,9 +131,10 @@ pub fn explore<'p, 'a>(product: &'p mut Product<'a>) -> Graph<'p, 'a> {
         gone_round: FxHashMap::default(),
         lean: None,
         depth: Vec::new(),
-        index: FxHashMap::default(),
+        once: Once::default(),
         open: BinaryHeap::new(),
         ways: FxHashMap::default(),
+        reacts: FxHashMap::default(),
         rounds: FxHashMap::default(),
     };
     match graph.product.start() {
@@ -202,15 +205,13 @@ impl Graph<'_, '_> {
     }
 
     /// The number of a state that is reached with at worst this failing.
-    pub(super) fn reach(&mut self, state: State, failed: Failed, depth: u32) -> u32 {
-        let mut hasher = FxHasher::default();
-        state.hash(&mut hasher);
-        let bucket = self.index.entry(hasher.finish()).or_default();
-        let known = bucket.iter().copied().find(|at| self.states[*at as usize] == state);
-        let id = known.unwrap_or_else(|| u32::try_from(self.states.len()).unwrap_or(NOWHERE));
+    pub(super) fn reach(&mut self, state: ProductState, failed: Failed, depth: u32) -> u32 {
+        let known = self.states.get_index_of(&state);
+        let id = u32::try_from(known.unwrap_or(self.states.len())).unwrap_or(NOWHERE);
         if known.is_none() {
-            bucket.push(id);
-            self.states.push(state);
+            let mut state = state;
+            self.once.share(&mut state);
+            self.states.insert(state);
             self.failed.push(failed);
             self.depth.push(depth);
             self.followed.push(false);
@@ -251,7 +252,8 @@ impl Graph<'_, '_> {
         self.troubles.extend(nexts.troubles.into_iter().map(|trouble| (at, trouble)));
         self.warned.extend(nexts.warnings.into_iter().map(|warnings| (at, warnings)));
         let shows = self.product.shows(&state);
-        for (place, next) in nexts.all.into_iter().enumerate() {
+        let mut all = nexts.all;
+        for (place, next) in all.drain(..).enumerate() {
             let place = u32::try_from(place).ok();
             if let Some(deep) = next.deep.0 {
                 // Of what was set aside the same may be applied anew without its frame being one more.
@@ -284,6 +286,10 @@ impl Graph<'_, '_> {
                     self.pushes.entry((id, request.requester)).or_default().push(edge);
                 }
             }
+            let reacts = match next.by {
+                Move::Answer => self.product.reacts(&state, &next),
+                _ => Reacts::new(),
+            };
             let failed = next.failed;
             let quiet = failed == Failed::Nothing && matches!(next.by, Move::Answer | Move::Taken(..));
             let barred = state.stopping.then(|| self.product.barred(next.by)).flatten();
@@ -298,8 +304,18 @@ impl Graph<'_, '_> {
             // Behind undoings that failed it is taken down by force anyway: only operators mind.
             next.stopping &= so_far.max(class) < Failed::Undo || !self.product.operator.is_empty();
             let to = self.reach(next, so_far.max(class), depth);
+            if class == Failed::Nothing && !reacts.is_empty() {
+                self.reacts.insert(u32::try_from(self.edges.len()).unwrap_or(NOWHERE), reacts);
+            }
             self.edges.push(Edge { from: at, to, place, by, failed: class, quiet, barred, dropped, shown });
         }
+        self.product.spare = all;
+    }
+
+    /// Whether the step of a reaction is done on an edge, as far as nothing fails.
+    pub(super) fn sets_off(&self, edge: usize, reaction: usize) -> bool {
+        let of = u32::try_from(edge).ok().and_then(|edge| self.reacts.get(&edge));
+        of.is_some_and(|of| of.iter().any(|at| usize::from(*at) == reaction))
     }
 
     fn is_lean(&self, at: u32) -> bool {
@@ -322,7 +338,7 @@ impl Graph<'_, '_> {
 
     /// What an operator's safe configuration leads to is the operator's to deal with: not every request fits in there. Where
     /// following that is not easy, nothing is known from there on but that it is in force.
-    fn abstracted(&mut self, next: Next, so_far: Failed) -> (State, Failed) {
+    fn abstracted(&mut self, next: Next, so_far: Failed) -> (ProductState, Failed) {
         let Next { mut state, failed, by_hand, .. } = next;
         if !by_hand || self.product.worlds.top(state.world).is_some() {
             return (state, failed);
@@ -336,7 +352,7 @@ impl Graph<'_, '_> {
         state.unconfirmed.clear();
         // What it interrupts may be over before, or not have begun: all the same where nothing is known.
         state.safe.retain(|request| request.requester != Requester::Operator);
-        state.flight.clear();
+        state.in_transit.clear();
         (state, failed.max(Failed::Undo))
     }
 

@@ -8,10 +8,10 @@
 //! difference, is not left out.
 
 use super::aside::Aside;
-use super::beside;
+use super::coupling;
 use super::product::Product;
 use super::shape::Undone;
-use super::state::{Answers, Move, Nexts, State};
+use super::state::{Answers, Move, Nexts, ProductState};
 use super::world::Worlds;
 use crate::model::{Ask, Catalogue, ComponentName, Deployment, EventName, MemberRef, RequestId, Snapshot, Target};
 use crate::stack::{Batch, Request, Requester, Why, claims};
@@ -59,7 +59,7 @@ pub struct Shown {
 /// A state in which it may be, and the answers of its last move that were not seen yet.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 struct May {
-    state: State,
+    state: ProductState,
     owed: Answers,
 }
 
@@ -86,7 +86,7 @@ impl<'a> Follower<'a> {
     pub fn new(deployment: &'a Deployment, charts: &[&'a Chart], catalogue: &Catalogue) -> Option<Self> {
         let numbers: Vec<usize> = (0..charts.len()).collect();
         let views: Vec<Deployment> =
-            numbers.iter().filter_map(|number| beside::view(deployment, charts, *number)).collect();
+            numbers.iter().filter_map(|number| coupling::view(deployment, charts, *number)).collect();
         let mut product = Product::new(deployment, &views, charts, &numbers, catalogue);
         product.worlds = Worlds::new(deployment, catalogue, Undone { in_order: true, ..Undone::default() });
         product.tells_all = true;
@@ -147,7 +147,7 @@ impl<'a> Follower<'a> {
     /// None does: how those look in which it may be.
     pub fn rests(&mut self, shown: &Shown) -> Result<Known, String> {
         let (rest, _) = self.silently();
-        let same: Vec<&State> = rest.iter().filter(|state| is_quiet(state) && self.fits(state, shown)).collect();
+        let same: Vec<&ProductState> = rest.iter().filter(|state| is_quiet(state) && self.fits(state, shown)).collect();
         let Some(first) = same.first() else {
             let told = self.told(rest.iter().filter(|s| is_quiet(s)));
             self.may = rest.into_iter().map(|state| May { state, owed: Answers::new() }).collect();
@@ -176,28 +176,30 @@ impl<'a> Follower<'a> {
     }
 
     /// All states in which it may be without anything further being seen, and those that the next answer would lead to.
-    fn silently(&mut self) -> (FxHashSet<State>, Vec<May>) {
-        let mut rest: FxHashSet<State> = FxHashSet::default();
+    fn silently(&mut self) -> (FxHashSet<ProductState>, Vec<May>) {
+        let mut rest: FxHashSet<ProductState> = FxHashSet::default();
         let mut answering: FxHashSet<May> = FxHashSet::default();
-        let mut open: Vec<State> = Vec::new();
+        let mut open: Vec<ProductState> = Vec::new();
         let mut more = false;
-        let mut note =
-            |may: May, rest: &mut FxHashSet<State>, open: &mut Vec<State>, answering: &mut FxHashSet<May>| {
-                if !may.owed.is_empty() {
-                    answering.insert(may);
-                } else if rest.len() >= MOST {
-                    // Not known to be new, but where so many are it does not matter.
-                    more = true;
-                } else if rest.insert(may.state.clone()) {
-                    open.push(may.state);
-                }
-            };
+        let mut note = |may: May,
+                        rest: &mut FxHashSet<ProductState>,
+                        open: &mut Vec<ProductState>,
+                        answering: &mut FxHashSet<May>| {
+            if !may.owed.is_empty() {
+                answering.insert(may);
+            } else if rest.len() >= MOST {
+                // Not known to be new, but where so many are it does not matter.
+                more = true;
+            } else if rest.insert(may.state.clone()) {
+                open.push(may.state);
+            }
+        };
         for may in std::mem::take(&mut self.may) {
             note(may, &mut rest, &mut open, &mut answering);
         }
         while let Some(state) = open.pop() {
             let mut nexts = self.product.goes_on(&state);
-            if state.flight.is_empty() && state.inbox.is_empty() && state.telling.is_empty() {
+            if state.in_transit.is_empty() && state.inbox.is_empty() && state.telling.is_empty() {
                 self.product.notices(&state, &mut nexts);
             }
             for next in nexts.all {
@@ -211,7 +213,7 @@ impl<'a> Follower<'a> {
         (rest, answering.into_iter().collect())
     }
 
-    fn fits(&self, state: &State, shown: &Shown) -> bool {
+    fn fits(&self, state: &ProductState, shown: &Shown) -> bool {
         self.leaves(state) == shown.leaves
             && open(state) == sorted(&shown.open)
             && self.product.worlds.get(state.world).is_none_or(|world| {
@@ -223,20 +225,20 @@ impl<'a> Follower<'a> {
             })
     }
 
-    fn leaves(&self, state: &State) -> Vec<String> {
+    fn leaves(&self, state: &ProductState) -> Vec<String> {
         let leaf = |(member, leaf): (&super::members::Member<'_>, &crate::statechart::NodeId)| {
             member.chart.fqn(*leaf).to_string()
         };
         self.product.members.iter().zip(&state.leaves).map(leaf).collect()
     }
 
-    fn frames(&self, state: &State) -> Vec<(String, String, usize)> {
+    fn frames(&self, state: &ProductState) -> Vec<(String, String, usize)> {
         let frames = self.product.worlds.get(state.world).map(|world| world.stack.frames()).unwrap_or_default();
         frames.iter().map(|f| (f.configuration.to_string(), f.requester.to_string(), f.parts.len().max(1))).collect()
     }
 
     /// The components that what is under way may be changing just now; none: any.
-    fn busy(&self, state: &State) -> Option<BTreeSet<ComponentName>> {
+    fn busy(&self, state: &ProductState) -> Option<BTreeSet<ComponentName>> {
         // What goes alone may take along frames that its text does not name.
         if state.desk.under_way().iter().any(|turn| turn.alone) {
             return None;
@@ -257,19 +259,19 @@ impl<'a> Follower<'a> {
         Some(busy)
     }
 
-    fn told<'s>(&self, states: impl Iterator<Item = &'s State>) -> String {
-        let one = |state: &State| {
+    fn told<'s>(&self, states: impl Iterator<Item = &'s ProductState>) -> String {
+        let one = |state: &ProductState| {
             let world = match self.product.worlds.get(state.world) {
                 Some(world) => format!("{:?}", world.system.snapshot()),
                 None => "not known".to_owned(),
             };
             let (desk, due) = (open(state), &state.due);
             let batch = |batch: &Batch| batch.requests.iter().map(|r| r.ask.to_string()).collect::<Vec<_>>();
-            let flight: Vec<_> = state.flight.iter().map(batch).collect();
+            let in_transit: Vec<_> = state.in_transit.iter().map(batch).collect();
             let stopped = state.interrupted.len() + state.undos().count();
             let under_way: Vec<_> = state.desk.under_way().iter().map(|turn| batch(&turn.batch)).collect();
             format!(
-                "- {:?} frames {:?} open {desk:?} of them under way {under_way:?} due {} inbox {} flight {flight:?} stopped {} unconfirmed {} system {world}",
+                "- {:?} frames {:?} open {desk:?} of them under way {under_way:?} due {} inbox {} in transit {in_transit:?} stopped {} unconfirmed {} system {world}",
                 self.leaves(state),
                 self.frames(state),
                 due.len(),
@@ -283,8 +285,8 @@ impl<'a> Follower<'a> {
 }
 
 /// Whether nothing is on its way: what is there stays until something comes from outside, or something under way ends.
-fn is_quiet(state: &State) -> bool {
-    state.inbox.is_empty() && state.flight.is_empty() && state.due.is_empty() && state.telling.is_empty()
+fn is_quiet(state: &ProductState) -> bool {
+    state.inbox.is_empty() && state.in_transit.is_empty() && state.due.is_empty() && state.telling.is_empty()
 }
 
 fn sorted(list: &[String]) -> Vec<String> {
@@ -294,7 +296,7 @@ fn sorted(list: &[String]) -> Vec<String> {
 }
 
 /// What is not answered in a state.
-fn open(state: &State) -> Vec<String> {
+fn open(state: &ProductState) -> Vec<String> {
     let under_way = state.desk.under_way().iter().flat_map(|turn| &turn.batch.requests);
     let waiting = state.desk.waiting().flat_map(|batch| &batch.requests);
     let all = under_way.chain(waiting).chain(&state.safe).chain(state.undos());

@@ -1,7 +1,7 @@
 //! Frames of a world: which are held by what is under way, which stay though the state they belonged to was left, and how one
 //! is found again in the world that follows.
 
-use super::outcome::{Beside, Held, Went, WorldId};
+use super::outcome::{ConcurrentWork, Held, Went, WorldId};
 use super::world::{Worlds, plain};
 use crate::model::ConfigId;
 use crate::stack::{Batch, Frame, FrameId, Request, Requester, Stack, held};
@@ -9,7 +9,7 @@ use smallvec::SmallVec;
 
 impl Worlds<'_> {
     /// The frames that a batch under way pops or hands over to.
-    pub fn held_by(&mut self, id: WorldId, requests: &[Request], begun: &Beside) -> Held {
+    pub fn held_by(&mut self, id: WorldId, requests: &[Request], begun: &ConcurrentWork) -> Held {
         let key = (id, plain(requests), begun.clone());
         if let Some(known) = self.helds.get(&key) {
             return known.clone();
@@ -22,7 +22,7 @@ impl Worlds<'_> {
     }
 
     /// The frames that undos of a batch under way are about and that stay, since these are refused.
-    pub fn staying(&self, id: WorldId, requests: &[Request], begun: &Beside) -> Held {
+    pub fn staying(&self, id: WorldId, requests: &[Request], begun: &ConcurrentWork) -> Held {
         let group = self.group(id, &plain(requests), begun);
         group.iter().flat_map(|group| &group.stay).map(|(_, frame)| *frame).collect()
     }

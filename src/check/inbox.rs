@@ -5,7 +5,7 @@
 //! there had come when the coordinator took something is not known, for those who tell it have threads of their own.
 
 use super::product::Product;
-use super::state::{Move, Nexts, State, index};
+use super::state::{Move, Nexts, ProductState, index};
 use crate::model::Precedence;
 use crate::model::precedence::taken_first;
 use crate::statechart::EventId;
@@ -24,7 +24,7 @@ pub(super) struct Takes {
 
 impl Product<'_> {
     /// What a coordinator may take next; that which it takes if all had come before, first.
-    pub(super) fn takes_next(&self, state: &State, number: usize) -> SmallVec<[Takes; 1]> {
+    pub(super) fn takes_next(&self, state: &ProductState, number: usize) -> SmallVec<[Takes; 1]> {
         let own = index(number);
         let lies = state.inbox.iter().enumerate().filter(|(_, (to, _))| *to == own);
         let lies: SmallVec<[(usize, EventId); 4]> = lies.map(|(at, (_, event))| (at, *event)).collect();
@@ -52,7 +52,13 @@ impl Product<'_> {
     }
 
     /// Whether a coordinator has taken what it takes if all had come before: nobody could tell how much had, else.
-    pub(super) fn takes_in_turn(&self, before: &State, after: &State, number: usize, event: EventId) -> bool {
+    pub(super) fn takes_in_turn(
+        &self,
+        before: &ProductState,
+        after: &ProductState,
+        number: usize,
+        event: EventId,
+    ) -> bool {
         let own = index(number);
         let all = self.takes_next(before, number);
         let Some(takes) = all.first().filter(|_| all.len() > 1) else { return true };
@@ -63,7 +69,7 @@ impl Product<'_> {
     /// A coordinator takes one of these.
     pub(super) fn take(
         &mut self,
-        state: &State,
+        state: &ProductState,
         number: usize,
         takes: impl IntoIterator<Item = Takes>,
         nexts: &mut Nexts,

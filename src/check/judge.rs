@@ -2,7 +2,7 @@
 
 use super::coordinator::place;
 use super::explore::Graph;
-use super::state::{Failed, Move, Next, State, Trouble};
+use super::state::{Failed, Move, Next, ProductState, Trouble};
 use super::trace::TraceStep;
 use crate::limits;
 use crate::model::codes::{
@@ -13,7 +13,7 @@ use crate::model::{
     Ask, ChangeKind, Code, ComponentName, ConfigId, Configuration, Finding, Findings, Severity, Verdict,
 };
 use crate::stack::{Request, Requester, claims};
-use crate::statechart::{NodeId, RaiseSite, When};
+use crate::statechart::{NodeId, RaiseMoment, RaiseSite};
 use crate::system::View;
 use rustc_hash::{FxHashMap, FxHashSet};
 use std::collections::BTreeSet;
@@ -30,7 +30,7 @@ impl Graph<'_, '_> {
         self.refusals(&mut found);
         self.hollow(&mut found);
         self.growing(&mut found);
-        self.unheard(&mut found);
+        self.unhandled(&mut found);
         self.endless(&mut found);
         let stuck = self.stuck(&mut found);
         self.leftovers(&mut found);
@@ -56,7 +56,7 @@ impl Graph<'_, '_> {
     }
 
     /// The first move that follows from a state of which this is so, with that state; none: there is none.
-    pub(super) fn following(&mut self, at: u32, is: impl Fn(&Next) -> bool) -> Vec<(State, Next)> {
+    pub(super) fn following(&mut self, at: u32, is: impl Fn(&Next) -> bool) -> Vec<(ProductState, Next)> {
         let next = self.nexts(at).all.into_iter().find(is);
         next.map(|next| (self.states[at as usize].clone(), next)).into_iter().collect()
     }
@@ -208,7 +208,7 @@ impl Graph<'_, '_> {
     }
 
     /// Components that a request is about, in the state's world.
-    fn about(&self, state: &State, ask: Ask, by: Requester) -> BTreeSet<ComponentName> {
+    fn about(&self, state: &ProductState, ask: Ask, by: Requester) -> BTreeSet<ComponentName> {
         let mut about = BTreeSet::new();
         if let Ask::Apply(id) | Ask::UndoOf(id) = ask
             && let Some(configuration) = self.product.worlds.configuration(id)
@@ -231,7 +231,7 @@ impl Graph<'_, '_> {
 
     /// Those whose frames are in the way of a request: they share a component (or a group) with it, and without their frames
     /// it would not be refused.
-    fn blamed(&self, state: &State, request: &Request) -> Vec<Requester> {
+    fn blamed(&self, state: &ProductState, request: &Request) -> Vec<Requester> {
         let Some(world) = self.product.worlds.get(state.world) else { return Vec::new() };
         let strange = |requester: &Requester| *requester != request.requester;
         // What a state brings with it, and nobody asks for else.
@@ -269,7 +269,7 @@ impl Graph<'_, '_> {
     }
 
     fn asked_by(&self, number: usize) -> BTreeSet<ConfigId> {
-        super::beside::asked(self.product.deployment, self.product.members[number].chart)
+        super::coupling::asked(self.product.deployment, self.product.members[number].chart)
     }
 
     /// Whether other coordinators ask for configurations that touch what a request is about: then what it meets there may be
@@ -287,7 +287,7 @@ impl Graph<'_, '_> {
 
     /// Who asks for a configuration that makes a component which is missing: the coordinator, the configuration and the
     /// component.
-    fn maker(&self, number: usize, state: &State, ask: Ask) -> Option<(String, ConfigId, ComponentName)> {
+    fn maker(&self, number: usize, state: &ProductState, ask: Ask) -> Option<(String, ConfigId, ComponentName)> {
         let world = self.product.worlds.get(state.world)?;
         let Ask::Apply(id) = ask else { return None };
         let own = self.product.worlds.configuration(id)?;
@@ -312,7 +312,9 @@ impl Graph<'_, '_> {
         let chart = self.product.members[number].chart;
         let owner = request.tag.0.checked_sub(1).and_then(|at| chart.node(usize::try_from(at).ok()?));
         let sites = || chart.raises().iter().filter(|site| site.name.as_str() == name);
-        sites().find(|site| matches!(site.when, When::Entry(node) if Some(node) == owner)).or_else(|| sites().next())
+        sites()
+            .find(|site| matches!(site.when, RaiseMoment::Entry(node) if Some(node) == owner))
+            .or_else(|| sites().next())
     }
 
     /// Configurations that are applied again and again.
@@ -361,13 +363,13 @@ impl Graph<'_, '_> {
     }
 
     /// What is lost, or taken back unconfirmed, and nobody hears.
-    fn unheard(&mut self, found: &mut Traced) {
+    fn unhandled(&mut self, found: &mut Traced) {
         let mut said: FxHashSet<(ConfigId, Verdict)> = FxHashSet::default();
-        let unheard = |trouble: &Trouble| match trouble {
-            Trouble::Unheard(id, verdict) => Some((*id, *verdict)),
+        let unhandled = |trouble: &Trouble| match trouble {
+            Trouble::Unhandled(id, verdict) => Some((*id, *verdict)),
             _ => None,
         };
-        let mut list = self.troubled(unheard);
+        let mut list = self.troubled(unhandled);
         // Where nothing is under way it comes without waiting for anything.
         list.sort_by_key(|(at, _)| (self.failed[*at as usize], !self.states[*at as usize].desk.is_empty()));
         for (at, (id, verdict)) in list {

@@ -2,7 +2,7 @@
 //! together the one with less left comes first.
 
 use super::product::Product;
-use super::state::{Move, Next, State};
+use super::state::{Move, Next, ProductState};
 use super::timers::{Timer, Waits, aged, comes_behind, takes};
 use super::tried::{Goal, Tried};
 use crate::limits;
@@ -41,7 +41,7 @@ impl Product<'_> {
     }
 
     /// How long these moves last at least, and what they wait for.
-    pub(super) fn lasts(&mut self, from: &State, moves: &[Next], tried: &Tried) -> Lasts {
+    pub(super) fn lasts(&mut self, from: &ProductState, moves: &[Next], tried: &Tried) -> Lasts {
         let mut lasts = Lasts { all: Duration::ZERO, timers: Vec::new(), overtaken: None, tied: false };
         let mut waits = Waits::new();
         let mut before = from;
@@ -64,7 +64,7 @@ impl Product<'_> {
     }
 
     /// Whether two moves come at the same moment and lead to different ends, since one of them takes away what the other waits for.
-    fn are_tied(&mut self, before: &State, (one, other): (&Next, &Next), waits: &Waits) -> bool {
+    fn are_tied(&mut self, before: &ProductState, (one, other): (&Next, &Next), waits: &Waits) -> bool {
         let Some((first, second)) = self.comes_by(one, waits).zip(self.comes_by(other, waits)) else { return false };
         if first.0 != second.0 || first.1 == second.1 || one.state == other.state {
             return false;
@@ -84,7 +84,7 @@ impl Product<'_> {
     }
 
     /// What comes in a state, by itself or from outside.
-    fn coming(&mut self, state: &State, tried: &Tried, waits: &Waits) -> Vec<Next> {
+    fn coming(&mut self, state: &ProductState, tried: &Tried, waits: &Waits) -> Vec<Next> {
         let own = self.by_itself(state, Some(waits)).ok().flatten();
         let mut all = self.outside_moves(state, tried, false);
         all.extend(own);
@@ -93,9 +93,9 @@ impl Product<'_> {
 }
 
 /// The way that lasts shortest, and on which what is over first comes first.
-pub(super) fn soonest(product: &mut Product<'_>, from: &State, tried: &Tried, goal: Goal) -> Soonest {
+pub(super) fn soonest(product: &mut Product<'_>, from: &ProductState, tried: &Tried, goal: Goal) -> Soonest {
     struct Place {
-        state: State,
+        state: ProductState,
         waits: Waits,
         before: Option<usize>,
         moves: Vec<Next>,
@@ -110,7 +110,7 @@ pub(super) fn soonest(product: &mut Product<'_>, from: &State, tried: &Tried, go
     };
     let start = Place { state: from.clone(), waits: Waits::new(), before: None, moves: Vec::new() };
     let mut places: Vec<Place> = vec![start];
-    let mut known: FxHashSet<(State, Waits)> = FxHashSet::default();
+    let mut known: FxHashSet<(ProductState, Waits)> = FxHashSet::default();
     let mut open: BinaryHeap<Reverse<(Duration, usize)>> = BinaryHeap::from([Reverse((Duration::ZERO, 0))]);
     let mut last = 0;
     while let Some(Reverse((at, place))) = open.pop() {

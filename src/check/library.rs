@@ -3,9 +3,10 @@
 
 use crate::model::codes::TYPE_DIFFERS;
 use crate::model::{
-    Catalogue, ComponentType, Deployment, Effect, Finding, Findings, Ident, OperationType, Origin, PortType,
-    PropertyType, Tunable, TypeName, ValueType,
+    Catalogue, ChangeKind, ComponentType, Deployment, Effect, Finding, Findings, Ident, OperationType, Origin,
+    PortType, PropertyType, Tunable, TypeName, ValueType,
 };
+use rustc_hash::FxHashSet;
 use std::collections::BTreeMap;
 use std::fmt::Display;
 
@@ -15,27 +16,46 @@ pub fn check(deployment: &Deployment, catalogue: &Catalogue) -> Findings {
     for declared in &deployment.types {
         // One that no library has is in the catalogue as it is declared.
         let Some(library) = catalogue.get(declared.name).filter(|ty| !ty.origin.is_some()) else { continue };
-        let mut of = Compared { ty: declared.name, origin: declared.origin, findings: &mut findings };
-        of.members("ports", "port", (&declared.ports, &library.ports), |of: &PortType| of.origin, port, |_| None);
-        of.members(
-            "properties",
-            "property",
-            (&declared.properties, &library.properties),
-            |of: &PropertyType| of.origin,
-            property,
-            |of| of.default.is_none().then_some("has no default: a `create` that does not give it fails"),
-        );
-        of.members(
-            "operations",
-            "operation",
-            (&declared.operations, &library.operations),
-            |of: &OperationType| of.origin,
-            operation,
-            |_| None,
-        );
-        of.whole(declared, library);
+        Compared { ty: declared.name, origin: declared.origin, by: By::Library, findings: &mut findings }
+            .types(declared, library);
     }
     findings
+}
+
+/// What the types that a deployment was checked with are otherwise than the platform that it is to run on has them, as far as
+/// its configurations make components of them. Where that makes no plan fail it is no difference.
+pub fn platform(deployment: &Deployment, catalogue: &Catalogue, platform: &Catalogue) -> Findings {
+    let mut findings = Findings::new();
+    let changes = deployment.configurations.iter().flat_map(|configuration| &configuration.changes);
+    let mut seen = FxHashSet::default();
+    for change in changes {
+        let (ChangeKind::Create { ty, .. } | ChangeKind::Replace { ty, .. }) = &change.kind else { continue };
+        let Some(checked) = catalogue.get(*ty).filter(|_| seen.insert(*ty)) else { continue };
+        let Some(own) = platform.get(*ty) else {
+            let message = format!("the platform `{}` has no type `{ty}`", deployment.platform);
+            findings.push(Finding::error(TYPE_DIFFERS, message).at(change.origin));
+            continue;
+        };
+        Compared { ty: *ty, origin: checked.origin, by: By::Platform, findings: &mut findings }.types(checked, own);
+    }
+    findings.retain(Finding::is_error);
+    findings
+}
+
+/// Who has a type otherwise than it was declared.
+#[derive(Clone, Copy)]
+enum By {
+    Library,
+    Platform,
+}
+
+impl By {
+    fn word(self) -> &'static str {
+        match self {
+            Self::Library => "library",
+            Self::Platform => "platform",
+        }
+    }
 }
 
 /// A difference: of what, as declared, as the library has it, and whether a plan could fail for it.
@@ -61,10 +81,33 @@ impl Departures {
 struct Compared<'f> {
     ty: TypeName,
     origin: Origin,
+    by: By,
     findings: &'f mut Findings,
 }
 
 impl Compared<'_> {
+    fn types(mut self, declared: &ComponentType, library: &ComponentType) {
+        let of = &mut self;
+        of.members("ports", "port", (&declared.ports, &library.ports), |of: &PortType| of.origin, port, |_| None);
+        of.members(
+            "properties",
+            "property",
+            (&declared.properties, &library.properties),
+            |of: &PropertyType| of.origin,
+            property,
+            |of| of.default.is_none().then_some("has no default: a `create` that does not give it fails"),
+        );
+        of.members(
+            "operations",
+            "operation",
+            (&declared.operations, &library.operations),
+            |of: &OperationType| of.origin,
+            operation,
+            |_| None,
+        );
+        of.whole(declared, library);
+    }
+
     fn members<T>(
         &mut self,
         key: &str,
@@ -74,16 +117,16 @@ impl Compared<'_> {
         compare: impl Fn(&T, &T) -> Departures,
         needed: impl Fn(&T) -> Option<&'static str>,
     ) {
-        let ty = self.ty;
+        let (ty, by) = (self.ty, self.by.word());
         for (name, own) in declared {
             let path = format!("types.{ty}.{key}.{name}");
             let Some(other) = library.get(name) else {
-                let message = format!("the library's `{ty}` has no {one} `{name}`");
+                let message = format!("the {by}'s `{ty}` has no {one} `{name}`");
                 self.tell(true, message, origin(own), path);
                 continue;
             };
             for Departure { what, declared, library, fails } in compare(own, other).0 {
-                let message = format!("`{ty}.{name}`: {what} is declared as {declared}, the library has {library}");
+                let message = format!("`{ty}.{name}`: {what} is declared as {declared}, the {by} has {library}");
                 self.tell(fails, message, origin(own), path.clone());
             }
         }
@@ -91,7 +134,7 @@ impl Compared<'_> {
             let path = format!("types.{ty}.{key}");
             let needed = needed(other);
             let why = needed.map_or_else(String::new, |why| format!(", which {why}"));
-            let message = format!("the library's `{ty}` has a {one} `{name}` that is not declared{why}");
+            let message = format!("the {by}'s `{ty}` has a {one} `{name}` that is not declared{why}");
             self.tell(needed.is_some(), message, self.origin, path);
         }
     }
@@ -110,17 +153,22 @@ impl Compared<'_> {
             words(all.iter().filter(|(_, is)| *is).map(|(word, _)| *word))
         });
         for Departure { what, declared, library, fails } in found.0 {
-            let message = format!("`{}`: {what} is declared as {declared}, the library has {library}", self.ty);
+            let message =
+                format!("`{}`: {what} is declared as {declared}, the {} has {library}", self.ty, self.by.word());
             self.tell(fails, message, self.origin, format!("types.{}.{what}", self.ty));
         }
     }
 
     fn tell(&mut self, fails: bool, message: String, at: Origin, path: String) {
         let make = if fails { Finding::error } else { Finding::warning };
-        let help = format!(
-            "the library's counts, as it is what runs: write what it has (`davit types {}` shows it), or leave the declaration out",
-            self.ty
-        );
+        let help = match self.by {
+            By::Library => format!(
+                "the library's counts, as it is what runs: write what it has (`davit types {}` shows it), or leave the declaration \
+                 out",
+                self.ty
+            ),
+            By::Platform => "the platform's counts, as it is what runs: declare what it has".to_owned(),
+        };
         self.findings.push(make(TYPE_DIFFERS, message).at(at).path(path).help(help));
     }
 }

@@ -1,7 +1,7 @@
 //! Which configurations in force are watched for what they stand for, and how that is lost on the simulated platform.
 
 use super::product::Product;
-use super::state::State;
+use super::state::ProductState;
 use crate::model::monitor::Condition;
 use crate::model::{ComponentName, ConfigId};
 use crate::stack::{is_stood_down, running_for};
@@ -18,7 +18,7 @@ pub enum Loss {
 
 impl Product<'_> {
     /// A configuration has been applied: what of it runs now is watched.
-    pub(super) fn stands_for(&self, state: &mut State, id: ConfigId) {
+    pub(super) fn stands_for(&self, state: &mut ProductState, id: ConfigId) {
         let Some(holds) = self.worlds.configuration(id).and_then(|c| c.holds.as_ref()) else { return };
         state.over.retain(|over| *over != id);
         state.stands.retain(|(of, _)| *of != id);
@@ -30,11 +30,11 @@ impl Product<'_> {
     }
 
     /// The world is another one: what something stands for that is in force is watched on, or no more.
-    pub(super) fn review_standings(&self, state: &mut State) {
+    pub(super) fn review_standings(&self, state: &mut ProductState) {
         if state.stands.is_empty() && state.over.is_empty() {
             return;
         }
-        let State { stands, over, world, .. } = state;
+        let ProductState { stands, over, world, .. } = state;
         let in_force = |id: ConfigId| self.worlds.is_in_force(*world, id);
         over.retain(|id| in_force(*id));
         stands.retain(|(id, _)| in_force(*id));
@@ -49,7 +49,7 @@ impl Product<'_> {
     }
 
     /// How a configuration in force is lost, and no other one with it.
-    pub fn loss(&self, state: &State, id: ConfigId) -> Option<Loss> {
+    pub fn loss(&self, state: &ProductState, id: ConfigId) -> Option<Loss> {
         let world = self.worlds.get(state.world)?;
         let holds = self.worlds.configuration(id)?.holds.as_ref().filter(|_| !state.over.contains(&id));
         let Some(holds) = holds else { return Some(Loss::Lie) };

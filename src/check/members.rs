@@ -1,12 +1,13 @@
 //! The coordinators of a product.
 
 use super::coordinator::ask_of;
-use super::reactions::{Reaction, Reactions};
+use super::reactions::{Macrostep, Reactions};
 use super::shape::Undone;
 use crate::model::{Ask, ComponentName, ConfigId, Deployment, EventName, Ident, Verdict};
 use crate::stack::Requester;
 use crate::statechart::{Chart, EventId, NodeId};
-use rustc_hash::FxHashSet;
+use rustc_hash::{FxHashMap, FxHashSet};
+use std::cell::RefCell;
 use std::rc::Rc;
 
 /// One of the coordinators.
@@ -24,6 +25,7 @@ pub struct Member<'a> {
     /// The name its frames go by.
     pub by: Requester,
     reactions: Option<Reactions<'a>>,
+    answers: RefCell<FxHashMap<(Ask, Verdict), EventId>>,
 }
 
 impl<'a> Member<'a> {
@@ -37,12 +39,12 @@ impl<'a> Member<'a> {
     }
 
     /// The first entry; none when the coordinator cannot be entered.
-    pub fn enter(&mut self) -> Option<Reaction> {
+    pub fn enter(&mut self) -> Option<Macrostep> {
         self.reactions().enter()
     }
 
     /// What happens in `leaf` when `event` comes.
-    pub fn react(&mut self, leaf: NodeId, event: EventId) -> Rc<Reaction> {
+    pub fn react(&mut self, leaf: NodeId, event: EventId) -> Rc<Macrostep> {
         self.reactions().react(leaf, event)
     }
 
@@ -55,6 +57,12 @@ impl<'a> Member<'a> {
     pub fn takes(&mut self, leaf: NodeId, name: EventName) -> bool {
         let event = self.chart.event(name);
         event != EventId::OTHER && self.react(leaf, event).taken
+    }
+
+    /// The event that tells an answer.
+    pub fn answer(&self, ask: Ask, verdict: Verdict) -> EventId {
+        let event = || self.chart.event(verdict.event(ask));
+        *self.answers.borrow_mut().entry((ask, verdict)).or_insert_with(event)
     }
 
     /// The name of a listed event.
@@ -107,6 +115,7 @@ pub fn members<'a>(deployment: &Deployment, charts: &[&'a Chart], numbers: &[usi
             failed: coordinator.failed.iter().filter_map(|state| chart.find(state).ok()).collect(),
             by,
             reactions: None,
+            answers: RefCell::default(),
         });
     }
     undone.ids = Some(ids);

@@ -1,19 +1,19 @@
 //! Is it sound: everything that can be said about a deployment before it runs. One file per family.
 //!
-//! Pure: no I/O, no clock, no platform. A [`Checked`] deployment can come only from here, and whoever starts something
+//! Pure: no I/O, no clock, no platform. An [`Accepted`] deployment can come only from here, and whoever starts something
 //! takes nothing else, so nothing runs that was not looked at.
 
-mod alike;
+mod adjacency;
 mod alone;
 mod arrive;
 mod aside;
 mod bars;
-mod beside;
 mod bound;
 mod closed;
 mod comes;
 mod configurations;
 mod coordinator;
+mod coupling;
 mod declared;
 mod detours;
 mod down;
@@ -21,9 +21,9 @@ mod drive;
 mod effort;
 mod endless;
 mod ends;
+mod equivalence;
 mod explore;
 mod failing;
-mod few;
 #[cfg(any(test, feature = "internals"))]
 mod follow;
 mod held;
@@ -38,6 +38,7 @@ mod loss;
 mod members;
 mod monitors;
 mod nowhere;
+mod once;
 mod orders;
 mod outcome;
 mod outside;
@@ -53,6 +54,7 @@ mod run;
 mod safety;
 mod settings;
 mod shape;
+mod shared_list;
 mod shown;
 mod shows;
 mod simulated;
@@ -65,7 +67,7 @@ mod tried;
 mod types;
 mod undo_failed;
 mod undriven;
-mod unheard;
+mod unhandled;
 mod universe;
 mod unknown;
 mod unwatched;
@@ -75,14 +77,15 @@ mod ways;
 mod when;
 mod world;
 
-pub use drive::{Drive, Happening, Until, drive};
+pub use drive::{Drive, Until, WayEvent, drive};
 pub use effort::{Effort, Far, Halt};
 #[cfg(any(test, feature = "internals"))]
 pub use follow::{Follower, Known, Seen, Shown};
-pub use report::{Checked, Explored, Report};
+pub use library::platform as on_platform;
+pub use report::{Accepted, Explored, Report};
 pub use run::{configurations, fault, monitors, run, run_with};
 pub use shown::why_no_way;
 #[cfg(any(test, feature = "internals"))]
 pub use shown::{FOLLOWED, READ};
-pub use trace::{Again, Answered, Does, Happened, Hears, Place, Replay, TraceStep};
-pub use verdict::Verdict;
+pub use trace::{Again, Answered, Does, Happened, HeardEvent, MoveReplay, Place, TraceStep};
+pub use verdict::CheckVerdict;

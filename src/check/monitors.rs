@@ -5,18 +5,18 @@ use crate::model::codes::{
     MONITOR_EVENT_TAKEN, MONITOR_NO_SUCH_PART, MONITOR_NOT_A_NUMBER, MONITOR_NOT_RUN, MONITOR_UNHEARD, UNKNOWN_ACTIVITY,
 };
 use crate::model::finding::did_you_mean;
-use crate::model::monitor::{Condition, ConditionKind, MONITORS_TYPE, Part, PortSignal, SignalKind};
+use crate::model::monitor::{Condition, ConditionKind, MONITORS_TYPE, PortSignal, SignalKind, ValuePart};
 use crate::model::statechart::is_internal;
 use crate::model::{
     Change, ComponentName, Deployment, Finding, Findings, Ident, MemberRef, Origin, PortType, ValueType,
 };
 use crate::statechart::Chart;
-use crate::system::Member;
+use crate::system::MemberClass;
 use std::collections::BTreeSet;
 
 /// What is wrong with the conditions.
 pub fn check(deployment: &Deployment, universe: &Universe) -> Findings {
-    let mut check = Check { deployment, universe, path: String::new(), findings: Vec::new() };
+    let mut check = MonitorCheck { deployment, universe, path: String::new(), findings: Vec::new() };
     for monitor in &deployment.monitors {
         check.path = format!("monitors.{}", monitor.name);
         check.condition(&monitor.when);
@@ -27,7 +27,7 @@ pub fn check(deployment: &Deployment, universe: &Universe) -> Findings {
 
 /// What is wrong with a condition that is no monitor's, said with that path.
 pub fn condition(deployment: &Deployment, universe: &Universe, condition: &Condition, path: String) -> Findings {
-    let mut check = Check { deployment, universe, path, findings: Vec::new() };
+    let mut check = MonitorCheck { deployment, universe, path, findings: Vec::new() };
     check.condition(condition);
     check.findings
 }
@@ -77,14 +77,14 @@ pub fn events(deployment: &Deployment, charts: &[&Chart]) -> Findings {
     findings
 }
 
-struct Check<'a> {
+struct MonitorCheck<'a> {
     deployment: &'a Deployment,
     universe: &'a Universe,
     path: String,
     findings: Findings,
 }
 
-impl Check<'_> {
+impl MonitorCheck<'_> {
     fn add(&mut self, finding: Finding) {
         self.findings.push(finding.path(self.path.clone()));
     }
@@ -130,7 +130,7 @@ impl Check<'_> {
         if !self.component(port.component, at) {
             return Vec::new();
         }
-        if let Some(finding) = self.universe.lacks(Member::Port, port, at) {
+        if let Some(finding) = self.universe.lacks(MemberClass::Port, port, at) {
             self.add(finding);
             return Vec::new();
         }
@@ -158,7 +158,8 @@ fn part(signal: &PortSignal, whole: &ValueType) -> Option<Finding> {
     let mut ty = whole;
     for step in &signal.path {
         ty = match (step, ty) {
-            (Part::Field(field), ValueType::Record(fields)) => match fields.iter().find(|(name, _)| name == field) {
+            (ValuePart::Field(field), ValueType::Record(fields)) => match fields.iter().find(|(name, _)| name == field)
+            {
                 Some((_, ty)) => ty,
                 None => {
                     let message = format!("`{}` carries {ty}, which has no field `{field}`", signal.member);
@@ -167,7 +168,7 @@ fn part(signal: &PortSignal, whole: &ValueType) -> Option<Finding> {
                     return Some(Finding::error(MONITOR_NO_SUCH_PART, message).help(help));
                 }
             },
-            (Part::Index(index), ValueType::Array(element, length)) => {
+            (ValuePart::Index(index), ValueType::Array(element, length)) => {
                 if length.is_some_and(|length| *index >= length) {
                     let message = format!("`{}` carries {ty}, which has no element {index}", signal.member);
                     let help = "elements are counted from 0";
@@ -175,11 +176,11 @@ fn part(signal: &PortSignal, whole: &ValueType) -> Option<Finding> {
                 }
                 element
             }
-            (Part::Field(field), _) => {
+            (ValuePart::Field(field), _) => {
                 let message = format!("`.{field}` of {ty}, which has no fields");
                 return Some(Finding::error(MONITOR_NO_SUCH_PART, message).help(help_for(signal, ty)));
             }
-            (Part::Index(index), _) => {
+            (ValuePart::Index(index), _) => {
                 let message = format!("`[{index}]` of {ty}, which has no elements");
                 return Some(Finding::error(MONITOR_NO_SUCH_PART, message).help(help_for(signal, ty)));
             }

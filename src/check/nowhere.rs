@@ -5,7 +5,7 @@ use super::product::Product;
 use super::reactions::triggers;
 use crate::model::codes::COORD_STUCK;
 use crate::model::{Ask, EventName, Finding};
-use crate::statechart::{NodeId, When};
+use crate::statechart::{NodeId, RaiseMoment};
 use std::collections::BTreeSet;
 
 impl Product<'_> {
@@ -20,11 +20,11 @@ impl Product<'_> {
         };
         let waits = listed(&mut names.intersection(&awaited).copied());
         // What it asks for itself, and hears another answer to.
-        let entered = |site: &&crate::statechart::RaiseSite| matches!(site.when, When::Entry(node) if chart.is_inside(leaf, node));
+        let entered = |site: &&crate::statechart::RaiseSite| matches!(site.when, RaiseMoment::Entry(node) if chart.is_inside(leaf, node));
         let asks = chart.raises().iter().filter(entered).filter_map(|site| ask_of(deployment, site.name));
         let told = |ask: Ask| [ask.done(), ask.failed(), ask.broken()].map(|verdict| verdict.event(ask));
         let own: Vec<Ask> = asks.filter(|ask| told(*ask).iter().any(|answer| names.contains(answer))).collect();
-        let unheard: BTreeSet<EventName> =
+        let unhandled: BTreeSet<EventName> =
             own.iter().flat_map(|ask| told(*ask)).filter(|answer| !names.contains(answer)).collect();
         let finding = if waits.is_empty() {
             let shutdown = deployment.shutdown.event;
@@ -37,12 +37,12 @@ impl Product<'_> {
                 false => format!("add a transition from it, at least on `{shutdown}`"),
             };
             Finding::warning(COORD_STUCK, format!("nothing leads on from `{fqn}`")).help(help)
-        } else if !unheard.is_empty() {
+        } else if !unhandled.is_empty() {
             let asked = own.iter().map(|ask| format!("`{ask}`")).collect::<Vec<_>>().join(", ");
             let message = format!("nothing leads on from `{fqn}`: {asked} is answered otherwise than with {waits}");
-            let unheard = listed(&mut unheard.into_iter());
+            let unhandled = listed(&mut unhandled.into_iter());
             Finding::warning(COORD_STUCK, message)
-                .help(format!("add a transition on the answers that it does not hear: {unheard}"))
+                .help(format!("add a transition on the answers that it does not hear: {unhandled}"))
         } else {
             let message = format!(
                 "what `{fqn}` waits for never comes: {waits}, for on this way nothing is asked for that would be answered so"

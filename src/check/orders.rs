@@ -4,7 +4,7 @@
 //! sure; and what does not arrive on it may in another order.
 
 use super::product::Product;
-use super::state::{Failed, Move, Next, State};
+use super::state::{Failed, Move, Next, ProductState};
 use super::tried::{Goal, Tried};
 use crate::limits;
 use crate::statechart::NodeId;
@@ -16,7 +16,7 @@ impl Product<'_> {
     /// many orders to look at.
     pub(super) fn comes_elsewhere(&mut self, moves: &[Next]) -> bool {
         let begins = |next: &&Next| !self.happens(next) || !self.answered_after(next).is_empty();
-        let begun: Vec<State> = moves.iter().filter(begins).map(|next| next.state.clone()).collect();
+        let begun: Vec<ProductState> = moves.iter().filter(begins).map(|next| next.state.clone()).collect();
         begun.into_iter().any(|state| self.rests(state).is_none_or(|rests| rests.len() > 1))
     }
 
@@ -26,14 +26,14 @@ impl Product<'_> {
     }
 
     /// What happens by itself at once, in whatever order, where nothing fails.
-    fn at_once(&mut self, state: &State) -> Vec<Next> {
+    fn at_once(&mut self, state: &ProductState) -> Vec<Next> {
         let mut all = self.goes_on(state).all;
         all.retain(|next| next.failed == Failed::Nothing && self.answered_after(next).is_empty());
         all
     }
 
     /// Where the coordinators may be when nothing happens by itself any more; none: there is too much to look at.
-    fn rests(&mut self, from: State) -> Option<FxHashSet<SmallVec<[NodeId; 2]>>> {
+    fn rests(&mut self, from: ProductState) -> Option<FxHashSet<SmallVec<[NodeId; 2]>>> {
         let (mut rests, mut known, mut open) = (FxHashSet::default(), FxHashSet::default(), vec![from]);
         while let Some(state) = open.pop() {
             if known.len() > limits::CHECK_DRIVEN || state.waiting() > limits::CHECK_PILED {
@@ -52,7 +52,7 @@ impl Product<'_> {
     }
 
     /// Whether in some order all come to the goal.
-    pub(super) fn arrives_in_some_order(&mut self, from: &State, tried: &Tried, goal: Goal) -> bool {
+    pub(super) fn arrives_in_some_order(&mut self, from: &ProductState, tried: &Tried, goal: Goal) -> bool {
         let (mut known, mut open) = (FxHashSet::default(), vec![(from.clone(), true)]);
         while let Some((state, first)) = open.pop() {
             if known.len() > limits::CHECK_DRIVEN {

@@ -39,7 +39,7 @@ impl Went {
 
 /// What is under way beside a batch, as far as the batch minds it.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Default)]
-pub struct Beside {
+pub struct ConcurrentWork {
     /// Frames that others pop or hand over to, or that wait for their confirmation.
     pub held: Held,
     /// The batch was begun as one, and some of it were answered since.

@@ -3,7 +3,7 @@
 use super::judge::created;
 use super::members::Member;
 use super::product::Product;
-use super::state::{Answers, Failed, Move, Next, Nexts, State, Trouble, bit, index};
+use super::state::{Answers, Failed, Move, Next, Nexts, ProductState, Trouble, bit, index};
 use crate::limits;
 use crate::model::{Ask, ConfigId, EventName, RequestId, Verdict};
 use crate::stack::{Batch, FrameId, Request, Requester, Why};
@@ -13,7 +13,7 @@ use std::collections::BTreeSet;
 
 impl Product<'_> {
     /// What comes when nothing lies in the inboxes.
-    pub(super) fn comes_from_outside(&mut self, state: &State, nexts: &mut Nexts) {
+    pub(super) fn comes_from_outside(&mut self, state: &ProductState, nexts: &mut Nexts) {
         let heard = self.times_come(state, nexts);
         self.unheard_shutdown(state, &heard, nexts);
         self.events_come(state, heard, nexts);
@@ -36,7 +36,7 @@ impl Product<'_> {
 
     /// What comes while some have not heard yet what came before: events from outside, also such as are waited for only behind that,
     /// and the times of those that have not moved since. One comes so: two at once show what comes of more.
-    pub(super) fn comes_across(&mut self, state: &State, nexts: &mut Nexts) {
+    pub(super) fn comes_across(&mut self, state: &ProductState, nexts: &mut Nexts) {
         if state.across {
             return;
         }
@@ -44,13 +44,13 @@ impl Product<'_> {
             self.overflow = true;
             return;
         }
-        let state = State { across: true, ..state.clone() };
+        let state = ProductState { across: true, ..state.clone() };
         self.times_come(&state, nexts);
         self.events_come(&state, self.alike.iter().copied().collect(), nexts);
     }
 
     /// Time passes for each. Answers the events from outside that are heard where they are.
-    fn times_come(&mut self, state: &State, nexts: &mut Nexts) -> BTreeSet<usize> {
+    fn times_come(&mut self, state: &ProductState, nexts: &mut Nexts) -> BTreeSet<usize> {
         let mut heard: BTreeSet<usize> = BTreeSet::new();
         for number in 0..self.members.len() {
             for event in self.members[number].offers(state.leaves[number]).iter() {
@@ -67,7 +67,7 @@ impl Product<'_> {
     }
 
     /// Each of these events comes from outside.
-    fn events_come(&mut self, state: &State, heard: BTreeSet<usize>, nexts: &mut Nexts) {
+    fn events_come(&mut self, state: &ProductState, heard: BTreeSet<usize>, nexts: &mut Nexts) {
         let busy: SmallVec<[bool; 4]> = (0..self.members.len()).map(|number| self.is_busy(state, number)).collect();
         for at in heard {
             let name = self.outside[at];
@@ -82,7 +82,7 @@ impl Product<'_> {
     }
 
     /// Whether a coordinator waits for as many answers as are followed.
-    fn is_busy(&self, state: &State, number: usize) -> bool {
+    fn is_busy(&self, state: &ProductState, number: usize) -> bool {
         state.outstanding(self.members[number].by) >= self.most_waiting
     }
 
@@ -109,14 +109,14 @@ impl Product<'_> {
     }
 
     /// The event that ends the deployment comes where nobody waits for it: it is raised once, and gone.
-    fn unheard_shutdown(&mut self, state: &State, heard: &BTreeSet<usize>, nexts: &mut Nexts) {
+    fn unheard_shutdown(&mut self, state: &ProductState, heard: &BTreeSet<usize>, nexts: &mut Nexts) {
         let shutdown = self.deployment.shutdown.event;
         let Some(at) = self.outside.iter().position(|name| *name == shutdown) else { return };
         if heard.contains(&at) || state.stopping || !self.minds_stopping || self.all_in(state, |member| member.down) {
             return;
         }
         let leaving = state.leaving || self.minds_operators();
-        let next = State { stopping: true, leaving, ..state.clone() };
+        let next = ProductState { stopping: true, leaving, ..state.clone() };
         let by = Move::Dropped(u16::try_from(at).unwrap_or(u16::MAX));
         nexts.all.push(Next::plain(by, next, Failed::Nothing));
     }
@@ -127,7 +127,7 @@ impl Product<'_> {
     }
 
     /// An event comes to all that wait for it.
-    pub(super) fn raised(&mut self, state: &State, name: EventName, by: Move, nexts: &mut Nexts) {
+    pub(super) fn raised(&mut self, state: &ProductState, name: EventName, by: Move, nexts: &mut Nexts) {
         let mut next = state.clone();
         next.stopping |= name == self.deployment.shutdown.event && self.minds_stopping;
         // Somebody wants it up again.
@@ -147,7 +147,7 @@ impl Product<'_> {
     }
 
     /// Confirmations that come or do not, and what is lost.
-    pub(super) fn notices(&mut self, state: &State, nexts: &mut Nexts) {
+    pub(super) fn notices(&mut self, state: &ProductState, nexts: &mut Nexts) {
         for (at, waits) in state.unconfirmed.iter().enumerate() {
             let Ask::Apply(id) = waits.request.ask else { continue };
             let mut next = state.clone();
@@ -178,7 +178,7 @@ impl Product<'_> {
             match next.inbox[..] {
                 [] if !holds => {}
                 [] => {
-                    nexts.troubles.push(Trouble::Unheard(id, Verdict::Lost));
+                    nexts.troubles.push(Trouble::Unhandled(id, Verdict::Lost));
                     nexts.all.push(Next::plain(by, next, class));
                 }
                 [(only, event)] => {
@@ -193,7 +193,7 @@ impl Product<'_> {
     }
 
     /// A frame is taken back, since its confirmation did not come in time.
-    fn unconfirmed(&mut self, state: &State, at: usize, id: ConfigId, nexts: &mut Nexts) {
+    fn unconfirmed(&mut self, state: &ProductState, at: usize, id: ConfigId, nexts: &mut Nexts) {
         let waits = state.unconfirmed[at];
         // In a world that is not known it may be any frame, or none any more.
         let unknown = self.worlds.top(state.world).filter(|_| self.tells_all).map(|_| FrameId(0));
@@ -213,8 +213,8 @@ impl Product<'_> {
         if state.is_owed(request.requester) {
             return;
         }
-        let beside = self.beside(&left, None);
-        let comes = self.worlds.comes(state.world, &[request], &beside);
+        let concurrent = self.concurrent_work(&left, None);
+        let comes = self.worlds.comes(state.world, &[request], &concurrent);
         let told = |verdict: Verdict| Answers::from_iter([request.as_told(verdict)]);
         if !comes.refused.is_empty() {
             nexts.troubles.extend(comes.refused.iter().map(|(_, why)| Trouble::Refused(request, why.clone())));
@@ -237,7 +237,7 @@ impl Product<'_> {
     /// what has just been done.
     pub(super) fn unheard_revert(
         &mut self,
-        state: &State,
+        state: &ProductState,
         number: usize,
         request: &Request,
         verdict: Verdict,
@@ -249,19 +249,19 @@ impl Product<'_> {
         };
         let under_way = state.desk.under_way().iter().flat_map(|turn| &turn.batch.requests);
         let waiting = state.desk.waiting().flat_map(|batch| &batch.requests);
-        let coming = state.flight.iter().flat_map(|batch| &batch.requests);
+        let coming = state.in_transit.iter().flat_map(|batch| &batch.requests);
         if under_way.chain(waiting).chain(coming).chain(state.undos()).any(undoes) {
             return None;
         }
         let member = &mut self.members[number];
-        let event = member.chart.event(verdict.event(request.ask));
+        let event = member.answer(request.ask, verdict);
         // That no state at all hears it is told without following anything.
         let heard = event == EventId::OTHER || member.react(state.leaves[number], event).taken;
-        (!heard).then_some(Trouble::Unheard(id, verdict))
+        (!heard).then_some(Trouble::Unhandled(id, verdict))
     }
 
     /// What an operator may ask for.
-    fn operators(&mut self, state: &State, nexts: &mut Nexts) {
+    fn operators(&mut self, state: &ProductState, nexts: &mut Nexts) {
         if state.stopping || self.worlds.top(state.world).is_some() || state.outstanding(Requester::Operator) > 0 {
             return;
         }

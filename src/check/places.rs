@@ -5,7 +5,7 @@ use super::explore::{Barred, Graph};
 use super::state::{Failed, Move, Next};
 use super::timers::{Timer, Timers, Wait, Waits, aged, comes_behind, takes};
 use crate::limits;
-use crate::model::{EventName, StepPattern};
+use crate::model::EventName;
 use crate::statechart::NodeId;
 use rustc_hash::FxHashMap;
 use std::cmp::Reverse;
@@ -87,11 +87,10 @@ impl Graph<'_, '_> {
     }
 
     /// Of these edges, what is reported a time after them.
-    pub(super) fn set_off(&mut self, edges: &[usize]) -> FxHashMap<usize, Vec<Timer>> {
+    pub(super) fn set_off(&self, edges: &[usize]) -> FxHashMap<usize, Vec<Timer>> {
         let mut set_off: FxHashMap<usize, Vec<Timer>> = FxHashMap::default();
-        for (at, reaction) in self.product.delayed() {
-            let with = self.edges_with(edges.iter().copied(), &StepPattern::new(&reaction.after));
-            let of = edges.iter().filter(|number| with[**number]);
+        for (at, _) in self.product.delayed() {
+            let of = edges.iter().filter(|number| self.sets_off(**number, at));
             of.for_each(|number| set_off.entry(*number).or_default().push(Timer::Reports(at)));
         }
         set_off

@@ -11,14 +11,14 @@
 //! inboxes are empty.
 
 use super::aside::Aside;
-use super::beside;
 use super::coordinator::outside_events;
+use super::coupling;
 use super::effort::{Effort, Left};
-use super::few::{Few, Shared};
 use super::members::{Member, hears_loss, members};
-use super::outcome::{Beside, Comes, EMPTY, Held, Went};
+use super::outcome::{Comes, ConcurrentWork, EMPTY, Held, Went, WorldId};
 use super::reactions::Asked;
-use super::state::{Failed, Move, Next, Nexts, State, bit, index};
+use super::shared_list::{Shared, SharedList};
+use super::state::{Failed, Move, Next, Nexts, ProductState, Reacts, bit, index, one};
 use super::world::Worlds;
 use crate::limits;
 use crate::model::{Catalogue, ConfigId, Deployment, EventName, Precedence, RequestId, Verdict};
@@ -84,6 +84,10 @@ pub struct Product<'a> {
     pub(super) aside: Aside,
     /// How much more is followed.
     pub(super) effort: Left<'a>,
+    /// What is known of reactions to steps.
+    pub(super) reacts: FxHashMap<(WorldId, SmallVec<[Request; 2]>, ConcurrentWork), Reacts>,
+    /// Room for what follows, used again and again.
+    pub(super) spare: Vec<Next>,
 }
 
 impl<'a> Product<'a> {
@@ -101,7 +105,7 @@ impl<'a> Product<'a> {
         for number in numbers {
             outside.extend(outside_of(deployment, &views[*number], charts[*number]));
         }
-        let operator = beside::operated(deployment, charts, numbers);
+        let operator = coupling::operated(deployment, charts, numbers);
         let losable = deployment.configurations.iter().map(|c| (c.id, c.holds.is_some()));
         let losable = losable.filter(|(id, holds)| *holds || hears_loss(charts, numbers, *id)).collect();
         let minds_stopping = !operator.is_empty() || members.len() == 1;
@@ -131,6 +135,8 @@ impl<'a> Product<'a> {
             by_hand: 1,
             aside: Aside::default(),
             effort: Effort::default().into(),
+            reacts: FxHashMap::default(),
+            spare: Vec::new(),
         };
         (product.worlds.judged, product.unjudged) = super::stands::judged(deployment, charts);
         product.aside = Aside::of(deployment, &product.members, &product.losable);
@@ -158,34 +164,34 @@ impl<'a> Product<'a> {
     }
 
     /// The state after the first entries; none when one of them cannot be entered.
-    pub fn start(&mut self) -> Option<State> {
+    pub fn start(&mut self) -> Option<ProductState> {
         let entered: Option<Vec<_>> = self.members.iter_mut().map(Member::enter).collect();
         let entered = entered?;
-        let state = State {
+        let state = ProductState {
             leaves: entered.iter().map(|reaction| reaction.leaf).collect(),
             world: EMPTY,
             desk: Shared::default(),
-            interrupted: Few::new(),
-            joined: Few::new(),
-            placed: Few::new(),
-            safe: Few::new(),
-            due: Few::new(),
-            telling: Few::new(),
+            interrupted: SharedList::new(),
+            joined: SharedList::new(),
+            placed: SharedList::new(),
+            safe: SharedList::new(),
+            due: SharedList::new(),
+            telling: SharedList::new(),
             stayed: false,
-            inbox: Few::new(),
-            unconfirmed: Few::new(),
-            lost: Few::new(),
-            stands: Few::new(),
-            over: Few::new(),
+            inbox: SharedList::new(),
+            unconfirmed: SharedList::new(),
+            lost: SharedList::new(),
+            stands: SharedList::new(),
+            over: SharedList::new(),
             aside: false,
             down: 0,
             stopping: false,
             leaving: false,
             moved: 0,
             across: false,
-            flight: Few::new(),
+            in_transit: SharedList::new(),
         };
-        let mut states = vec![state];
+        let mut states = one(state);
         for (by, reaction) in entered.iter().enumerate() {
             states = states.into_iter().flat_map(|state| self.follow(state, by, reaction)).collect();
         }
@@ -194,27 +200,27 @@ impl<'a> Product<'a> {
     }
 
     /// All that follows from a state.
-    pub fn nexts(&mut self, state: &State) -> Nexts {
+    pub fn nexts(&mut self, state: &ProductState) -> Nexts {
         let mut nexts = self.goes_on(state);
-        if state.flight.is_empty() && state.inbox.is_empty() {
+        if state.in_transit.is_empty() && state.inbox.is_empty() {
             self.comes_from_outside(state, &mut nexts);
-        } else if state.flight.is_empty() && self.crosses {
+        } else if state.in_transit.is_empty() && self.crosses {
             self.comes_across(state, &mut nexts);
         }
         nexts
     }
 
     /// What follows from a state without anything coming from outside.
-    pub(super) fn goes_on(&mut self, state: &State) -> Nexts {
-        let mut nexts = Nexts::default();
-        // A batch in flight comes when one of those that it would stop is over.
+    pub(super) fn goes_on(&mut self, state: &ProductState) -> Nexts {
+        let mut nexts = Nexts { all: std::mem::take(&mut self.spare), ..Nexts::default() };
+        // A batch in transit comes when one of those that it would stop is over.
         self.answers_come(state, &mut nexts);
         self.behind_given_up(state, &mut nexts);
         // What was interrupted goes back when the safe configuration is there, and what came later ends later.
         let going = state.desk.under_way().iter().filter(|_| state.safe.is_empty());
         let going =
-            going.filter(|turn| turn.batch.requests.first().is_none_or(|first| !state.is_owed(first.requester)));
-        let numbers: SmallVec<[u32; 4]> = going.map(|turn| turn.number).collect();
+            going.filter(|active| active.batch.requests.first().is_none_or(|first| !state.is_owed(first.requester)));
+        let numbers: SmallVec<[u32; 4]> = going.map(|active| active.number).collect();
         for number in numbers {
             match state.is_stopped(number) {
                 true => self.stopped_ends(state, number, &mut nexts),
@@ -228,7 +234,7 @@ impl<'a> Product<'a> {
             if let Some(at) = state.telling.iter().position(mine) {
                 let mut next = state.clone();
                 let (request, verdict) = next.telling.remove(at);
-                let event = self.members[number].chart.event(verdict.event(request.ask));
+                let event = self.members[number].answer(request.ask, verdict);
                 self.hear(next, number, event, Move::Taken(own, event), &mut nexts);
                 let urgent = self.takes_next(state, number).into_iter().filter(|takes| takes.urgent);
                 self.take(state, number, urgent, &mut nexts);
@@ -241,7 +247,7 @@ impl<'a> Product<'a> {
     }
 
     /// Answers that come whatever else does: those on their way, and of safe configurations.
-    fn answers_come(&mut self, state: &State, nexts: &mut Nexts) {
+    fn answers_come(&mut self, state: &ProductState, nexts: &mut Nexts) {
         if let Some((request, verdict)) = state.due.first().copied() {
             let mut next = state.clone();
             next.due.remove(0);
@@ -260,7 +266,7 @@ impl<'a> Product<'a> {
     }
 
     /// A coordinator hears an event.
-    pub(super) fn hear(&mut self, state: State, number: usize, event: EventId, by: Move, nexts: &mut Nexts) {
+    pub(super) fn hear(&mut self, state: ProductState, number: usize, event: EventId, by: Move, nexts: &mut Nexts) {
         for state in self.react(state, number, event) {
             let next = Next::plain(by, self.settle(state), Failed::Nothing);
             nexts.all.push(next);
@@ -274,7 +280,7 @@ impl<'a> Product<'a> {
 
     /// What batches and safe configurations that stopped at last come to is decided in `ends`; this settles what needs no
     /// decision: who comes to *down*, and when the deployment is down.
-    pub(super) fn settle(&mut self, mut state: State) -> State {
+    pub(super) fn settle(&mut self, mut state: ProductState) -> ProductState {
         state.stopping &= !(state.is_at_rest() && self.all_in(&state, |member| member.down));
         if state.inbox.is_empty() {
             (state.moved, state.across) = (0, false);
@@ -283,7 +289,7 @@ impl<'a> Product<'a> {
     }
 
     /// Takes over a world.
-    pub(super) fn go(&self, state: &mut State, went: &Went) {
+    pub(super) fn go(&self, state: &mut ProductState, went: &Went) {
         let from = std::mem::replace(&mut state.world, went.world);
         if let Some(places) = &went.places {
             // Frames have the numbers of their world.
@@ -308,17 +314,17 @@ impl<'a> Product<'a> {
     }
 
     /// What `requests` come to in the state's world.
-    pub fn comes(&mut self, state: &State, number: u32, requests: &[Request]) -> Rc<Comes> {
-        let beside = self.beside(state, Some(number));
-        self.worlds.comes(state.world, requests, &beside)
+    pub fn comes(&mut self, state: &ProductState, number: u32, requests: &[Request]) -> Rc<Comes> {
+        let concurrent = self.concurrent_work(state, Some(number));
+        self.worlds.comes(state.world, requests, &concurrent)
     }
 
     /// What stands beside a batch under way (none: beside what does not wait) in the state's world.
-    pub(super) fn beside(&mut self, state: &State, number: Option<u32>) -> Beside {
+    pub(super) fn concurrent_work(&mut self, state: &ProductState, number: Option<u32>) -> ConcurrentWork {
         let mut held = Held::new();
-        for turn in state.desk.under_way().iter().filter(|turn| Some(turn.number) != number) {
-            let planned = state.planned(turn.number);
-            let own = self.worlds.held_by(planned, &turn.batch.requests, &Self::as_begun(state, turn.number));
+        for active in state.desk.under_way().iter().filter(|active| Some(active.number) != number) {
+            let planned = state.planned(active.number);
+            let own = self.worlds.held_by(planned, &active.batch.requests, &Self::as_begun(state, active.number));
             held.extend(own.into_iter().filter_map(|frame| self.worlds.below(planned, state.world, frame)));
         }
         held.extend(state.unconfirmed.iter().filter_map(|waits| self.worlds.frame(state.world, waits.place)));
@@ -326,39 +332,39 @@ impl<'a> Product<'a> {
         held.dedup();
         let placed = number.is_some_and(|number| state.placed.contains(&number));
         let begun = number.map(|number| Self::as_begun(state, number)).unwrap_or_default();
-        Beside { held, placed, ..begun }
+        ConcurrentWork { held, placed, ..begun }
     }
 
     /// How a batch under way has begun.
-    pub(super) fn as_begun(state: &State, number: u32) -> Beside {
-        let alone = state.desk.turn_of(number).is_some_and(|turn| turn.alone);
-        Beside { joined: state.joined.contains(&number), alone, ..Beside::default() }
+    pub(super) fn as_begun(state: &ProductState, number: u32) -> ConcurrentWork {
+        let alone = state.desk.active(number).is_some_and(|active| active.alone);
+        ConcurrentWork { joined: state.joined.contains(&number), alone, ..ConcurrentWork::default() }
     }
 
     /// Frames that undos under way are about, also those of which it is known that they stay: no later undo by leaving the
     /// same state is about them.
-    pub(super) fn frames_left(&mut self, state: &State) -> Held {
-        let mut left = self.beside(state, None).held;
-        for turn in state.desk.under_way() {
-            let planned = state.planned(turn.number);
-            let stay = self.worlds.staying(planned, &turn.batch.requests, &Self::as_begun(state, turn.number));
+    pub(super) fn frames_left(&mut self, state: &ProductState) -> Held {
+        let mut left = self.concurrent_work(state, None).held;
+        for active in state.desk.under_way() {
+            let planned = state.planned(active.number);
+            let stay = self.worlds.staying(planned, &active.batch.requests, &Self::as_begun(state, active.number));
             left.extend(stay.into_iter().filter_map(|frame| self.worlds.below(planned, state.world, frame)));
         }
         left
     }
 
     /// Whether all of them are down, with nothing left to be answered or heard.
-    pub fn is_down(&self, state: &State) -> bool {
+    pub fn is_down(&self, state: &ProductState) -> bool {
         state.is_at_rest() && self.all_in(state, |member| member.down)
     }
 
     /// Whether all of them have come to *down* and asked for nothing since.
-    pub(super) fn all_down(&self, state: &State) -> bool {
+    pub(super) fn all_down(&self, state: &ProductState) -> bool {
         (0..self.members.len()).all(|number| state.down & bit(number) != 0)
     }
 
     /// The coordinator that is in a state which means that the bring-up has failed: a running deployment is stopped there.
-    pub(super) fn failed_in(&self, state: &State) -> Option<usize> {
+    pub(super) fn failed_in(&self, state: &ProductState) -> Option<usize> {
         let within = |number: &usize| {
             let (member, leaf) = (&self.members[*number], state.leaves[*number]);
             member.failed.iter().any(|failed| member.chart.is_inside(leaf, *failed))
@@ -366,7 +372,7 @@ impl<'a> Product<'a> {
         (0..self.members.len()).find(within)
     }
 
-    pub(super) fn all_in(&self, state: &State, goal: impl Fn(&Member<'_>) -> Option<NodeId>) -> bool {
+    pub(super) fn all_in(&self, state: &ProductState, goal: impl Fn(&Member<'_>) -> Option<NodeId>) -> bool {
         let inside = |(member, leaf): (&Member<'_>, &NodeId)| {
             goal(member).is_some_and(|goal| member.chart.is_inside(*leaf, goal))
         };

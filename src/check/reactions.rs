@@ -7,7 +7,7 @@ use super::coordinator::ask_of;
 use crate::model::statechart::FunctionId;
 use crate::model::{Ask, Deployment, EventName};
 use crate::stack::Scope;
-use crate::statechart::{Chart, Doo, EdgeId, EventId, Hook, Machine, NodeId, Raised, View};
+use crate::statechart::{Chart, Doo, EdgeId, EventId, Hook, HookContext, Machine, NodeId, Raised};
 use crate::time::Time;
 use rustc_hash::FxHashMap;
 use std::rc::Rc;
@@ -34,7 +34,7 @@ pub enum Handed {
 
 /// What one event leads to, until the coordinator is at rest again.
 #[derive(Debug, Clone)]
-pub struct Reaction {
+pub struct Macrostep {
     /// The leaf that is active then.
     pub leaf: NodeId,
     /// Whether a transition was taken at all.
@@ -52,7 +52,7 @@ pub struct Reactions<'a> {
     deployment: &'a Deployment,
     chart: &'a Chart,
     machine: Machine,
-    table: FxHashMap<(NodeId, EventId), Rc<Reaction>>,
+    table: FxHashMap<(NodeId, EventId), Rc<Macrostep>>,
     offers: FxHashMap<NodeId, Rc<Vec<EventId>>>,
     outside: Vec<EventId>,
     down: Option<NodeId>,
@@ -73,9 +73,9 @@ impl<'a> Reactions<'a> {
         }
     }
 
-    fn watch(&self, from: Option<NodeId>) -> Watch<'_> {
+    fn watch(&self, from: Option<NodeId>) -> MacrostepRecorder<'_> {
         let is_down = from.is_some_and(|leaf| self.down.is_some_and(|down| self.chart.is_inside(leaf, down)));
-        Watch {
+        MacrostepRecorder {
             deployment: self.deployment,
             down: self.down,
             is_down,
@@ -88,7 +88,7 @@ impl<'a> Reactions<'a> {
     }
 
     /// The first entry; none when the coordinator cannot be entered.
-    pub fn enter(&mut self) -> Option<Reaction> {
+    pub fn enter(&mut self) -> Option<Macrostep> {
         let mut machine = Machine::new(self.chart);
         // Where it begins in *down* it has come there: it is down until it asks for something.
         let mut hook = self.watch(None);
@@ -97,7 +97,7 @@ impl<'a> Reactions<'a> {
     }
 
     /// What happens in `leaf` when `event` comes.
-    pub fn react(&mut self, leaf: NodeId, event: EventId) -> Rc<Reaction> {
+    pub fn react(&mut self, leaf: NodeId, event: EventId) -> Rc<Macrostep> {
         if let Some(known) = self.table.get(&(leaf, event)) {
             return known.clone();
         }
@@ -154,7 +154,7 @@ pub fn triggers(chart: &Chart, leaf: NodeId) -> (Vec<EventId>, bool) {
 }
 
 /// Writes down what is raised and left.
-struct Watch<'a> {
+struct MacrostepRecorder<'a> {
     deployment: &'a Deployment,
     down: Option<NodeId>,
     is_down: bool,
@@ -165,14 +165,14 @@ struct Watch<'a> {
     emitted: Vec<EventName>,
 }
 
-impl Watch<'_> {
-    fn reaction(self, leaf: NodeId) -> Reaction {
+impl MacrostepRecorder<'_> {
+    fn reaction(self, leaf: NodeId) -> Macrostep {
         let Self { taken, handed, left, emitted, .. } = self;
-        Reaction { leaf, taken, handed, left, emitted }
+        Macrostep { leaf, taken, handed, left, emitted }
     }
 }
 
-impl Hook for Watch<'_> {
+impl Hook for MacrostepRecorder<'_> {
     fn exited(&mut self, _: &Chart, state: NodeId) {
         let earlier = self.handed.iter_mut().flat_map(|handed| match handed {
             Handed::Batch(asked) => asked.as_mut_slice(),
@@ -190,7 +190,7 @@ impl Hook for Watch<'_> {
         self.taken = true;
     }
 
-    fn after_step(&mut self, view: &mut View<'_>) {
+    fn after_step(&mut self, view: &mut HookContext<'_>) {
         if !self.batch.is_empty() {
             self.handed.push(Handed::Batch(std::mem::take(&mut self.batch)));
         }
@@ -202,15 +202,15 @@ impl Hook for Watch<'_> {
     }
 
     // What a function decides is not known: it is taken to let everything pass, and what is found then is a warning.
-    fn guard(&mut self, _: FunctionId, _: EdgeId, _: &mut View<'_>) -> bool {
+    fn guard(&mut self, _: FunctionId, _: EdgeId, _: &mut HookContext<'_>) -> bool {
         true
     }
 
-    fn predicate(&mut self, _: FunctionId, _: EventId, _: &mut View<'_>) -> bool {
+    fn predicate(&mut self, _: FunctionId, _: EventId, _: &mut HookContext<'_>) -> bool {
         true
     }
 
-    fn doo(&mut self, _: FunctionId, _: NodeId, _: &mut View<'_>) -> Doo {
+    fn doo(&mut self, _: FunctionId, _: NodeId, _: &mut HookContext<'_>) -> Doo {
         Doo::Finished
     }
 

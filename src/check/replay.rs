@@ -6,12 +6,12 @@
 //! when something else happens is gone in another order, and a script that replays it fails there.
 
 use super::loss::Loss;
-use super::outcome::Beside;
+use super::outcome::ConcurrentWork;
 use super::product::Product;
 use super::shows::{AT_ONCE, answered, goes, goes_back, races, same, too_late, under_way};
 use super::stands::stands_after;
-use super::state::{Move, Next, State};
-use super::trace::{Does, Replay};
+use super::state::{Move, Next, ProductState};
+use super::trace::{Does, MoveReplay};
 use crate::limits;
 use crate::model::codes::CONF_HOLDS_NEVER;
 use crate::model::{Ask, ConfigId, EventName, FaultKind, Finding, OnFailure, Step, Verdict};
@@ -42,17 +42,17 @@ const GOES_BACK: &str = "what was interrupted or given up goes back at once";
 
 impl Product<'_> {
     /// What each move of a way needs. `way` has the state before each move.
-    pub fn replay(&mut self, way: &[(&State, &Next)]) -> Vec<Replay> {
+    pub fn replay(&mut self, way: &[(&ProductState, &Next)]) -> Vec<MoveReplay> {
         let entries = self.entries(way);
         let begun = self.begun(way);
         let split = self.split(way);
         let times = self.times(way, &begun, &split, &entries);
-        let mut all: Vec<Replay> = (way.iter().zip(&times))
+        let mut all: Vec<MoveReplay> = (way.iter().zip(&times))
             .enumerate()
-            .map(|(k, ((before, next), at))| Replay {
+            .map(|(k, ((before, next), at))| MoveReplay {
                 at: *at,
                 does: self.does(&way[..k], before, next),
-                ..Replay::default()
+                ..MoveReplay::default()
             })
             .collect();
         // What comes at the instant of something else is armed before that.
@@ -153,7 +153,7 @@ impl Product<'_> {
     }
 
     /// Whether a safe configuration waits for another one that does all that it is about, and would be under way for longer.
-    fn finds_all_done(&self, way: &[(&State, &Next)], batch: &Begun, times: &[Duration]) -> bool {
+    fn finds_all_done(&self, way: &[(&ProductState, &Next)], batch: &Begun, times: &[Duration]) -> bool {
         let begins = &way[batch.at].1.state;
         let own = |request: &Request| same(std::slice::from_ref(request), &batch.requests);
         if begins.safe.len() < 2 || !begins.safe.iter().any(own) {
@@ -161,12 +161,18 @@ impl Product<'_> {
         }
         let over = batch.over.unwrap_or(way.len() - 1);
         let Some(alone) = (batch.at + 1..over).find(|k| way[*k].1.state.safe.len() == 1) else { return false };
-        let group = self.worlds.group(way[alone].1.state.world, &batch.requests, &Beside::default());
+        let group = self.worlds.group(way[alone].1.state.world, &batch.requests, &ConcurrentWork::default());
         times[over] > times[alone] && group.is_some_and(|g| g.planned.is_none_or(|planned| planned.steps.is_empty()))
     }
 
     /// Whether what is armed for the rest of a batch would meet a step with which what was given up of it goes back just then.
-    fn meets_what_goes_back(&self, way: &[(&State, &Next)], begun: &[Begun], batch: &Begun, arms: &[Armed]) -> bool {
+    fn meets_what_goes_back(
+        &self,
+        way: &[(&ProductState, &Next)],
+        begun: &[Begun],
+        batch: &Begun,
+        arms: &[Armed],
+    ) -> bool {
         let given_up = way[batch.at].1.answers.iter().filter(|(_, verdict)| *verdict == Verdict::Cancelled);
         let of = |request: &Request| {
             begun.iter().find(|of| of.over == Some(batch.at) && !of.idle && of.requests.contains(request))
@@ -188,7 +194,7 @@ impl Product<'_> {
     }
 
     /// Whether an event from another coordinator, or of a loss, is on its way to one: that nobody holds up.
-    pub(super) fn is_told_between(&self, state: &State) -> bool {
+    pub(super) fn is_told_between(&self, state: &ProductState) -> bool {
         state.inbox.iter().any(|(to, event)| {
             let name = self.members[usize::from(*to)].name_of(*event);
             !name.is_some_and(|name| self.outside.contains(&name))
@@ -197,7 +203,7 @@ impl Product<'_> {
 
     /// Where an event from outside has to be raised for each coordinator alone, since they do not hear of it one after the
     /// other and before anything else happens.
-    fn split(&self, way: &[(&State, &Next)]) -> Split {
+    fn split(&self, way: &[(&ProductState, &Next)]) -> Split {
         let mut split = Split::default();
         for (k, (_, next)) in way.iter().enumerate() {
             let Move::Event(at) = next.by else { continue };
@@ -237,7 +243,7 @@ impl Product<'_> {
     }
 
     /// The batches that begin on a way, and safe configurations.
-    fn begun(&self, way: &[(&State, &Next)]) -> Vec<Begun> {
+    fn begun(&self, way: &[(&ProductState, &Next)]) -> Vec<Begun> {
         let mut all: Vec<Begun> = Vec::new();
         for (k, (before, next)) in way.iter().enumerate() {
             // One that is over may be followed at once by another of the same requests.
@@ -246,7 +252,7 @@ impl Product<'_> {
                 if known.iter().any(|other| same(other, &requests)) {
                     continue;
                 }
-                let gone = |(before, next): &(&State, &Next)| {
+                let gone = |(before, next): &(&ProductState, &Next)| {
                     answered(before, next, &requests)
                         || !under_way(&next.state).iter().any(|other| same(other, &requests))
                 };
@@ -269,7 +275,7 @@ impl Product<'_> {
     /// Why no single fault makes it end so.
     fn arms(
         &self,
-        state: &State,
+        state: &ProductState,
         requests: &[Request],
         answers: &[(Request, Verdict)],
         takes: Duration,
@@ -299,9 +305,9 @@ impl Product<'_> {
             fails = fails.or(first);
             arms.extend(first.map(|at| (text(at), how, Duration::ZERO)));
             // What is begun together with it, and done, would stay: then it has not simply failed.
-            let beside = first.filter(|_| how == FaultKind::Fail && stays(planned, part));
-            let beside = beside.into_iter().flat_map(|first| begun_with(planned, first, part));
-            arms.extend(beside.take(limits::SESSION_WORKERS - 1).map(|at| (text(at), how, Duration::ZERO)));
+            let concurrent = first.filter(|_| how == FaultKind::Fail && stays(planned, part));
+            let concurrent = concurrent.into_iter().flat_map(|first| begun_with(planned, first, part));
+            arms.extend(concurrent.take(limits::SESSION_WORKERS - 1).map(|at| (text(at), how, Duration::ZERO)));
         }
         // What hangs takes its time by itself.
         if takes.is_zero() || planned.steps.is_empty() || answers.iter().any(broken) {
@@ -335,9 +341,9 @@ impl Product<'_> {
     /// What a batch says to have done and has not, where something it applies is lost for that later.
     fn lie(
         &self,
-        way: &[(&State, &Next)],
+        way: &[(&ProductState, &Next)],
         over: usize,
-        state: &State,
+        state: &ProductState,
         batch: &Begun,
     ) -> Option<(String, FaultKind, Duration)> {
         let ok = |next: &Next, id: ConfigId| {
@@ -357,8 +363,8 @@ impl Product<'_> {
         seen.next().map(|step| (pattern(step), FaultKind::Lie, Duration::ZERO))
     }
 
-    fn does(&self, way: &[(&State, &Next)], before: &State, next: &Next) -> Does {
-        if !next.state.flight.is_empty() {
+    fn does(&self, way: &[(&ProductState, &Next)], before: &ProductState, next: &Next) -> Does {
+        if !next.state.in_transit.is_empty() {
             return Does::Cannot("an answer comes while what would stop it is on its way");
         }
         match next.by {
@@ -384,7 +390,7 @@ impl Product<'_> {
     }
 
     /// Whether the event that ends the deployment has come since it was last wanted up.
-    fn was_ended(&self, way: &[(&State, &Next)]) -> bool {
+    fn was_ended(&self, way: &[(&ProductState, &Next)]) -> bool {
         let last = way.iter().rev().find_map(|(_, next)| match next.by {
             Move::Event(at) | Move::Dropped(at) if self.is_first_or_last(Move::Event(at)) => {
                 Some(self.outside[usize::from(at)])

@@ -1,7 +1,7 @@
 //! What `check` has to say of a deployment, and the deployment as one that was checked.
 
 use super::trace::TraceStep;
-use super::verdict::Verdict;
+use super::verdict::CheckVerdict;
 use crate::model::{Deployment, Findings};
 use serde::Serialize;
 use std::ops::Deref;
@@ -9,9 +9,9 @@ use std::sync::Arc;
 
 /// Something in which `check` found nothing that refuses it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Checked<T>(Arc<T>);
+pub struct Accepted<T>(Arc<T>);
 
-impl<T> Checked<T> {
+impl<T> Accepted<T> {
     /// What was looked at.
     pub(super) fn new(thing: Arc<T>) -> Self {
         Self(thing)
@@ -23,7 +23,7 @@ impl<T> Checked<T> {
     }
 }
 
-impl<T> Deref for Checked<T> {
+impl<T> Deref for Accepted<T> {
     type Target = T;
     fn deref(&self) -> &T {
         &self.0
@@ -62,10 +62,10 @@ impl Explored {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Report {
     /// The deployment, if nothing refuses it.
-    pub checked: Option<Checked<Deployment>>,
+    pub checked: Option<Accepted<Deployment>>,
     /// The deployment, if whatever refuses it was found by following its coordinators: fit to be replayed on the simulated
     /// platform, where the ways to that can be gone, and for nothing else.
-    pub replayed: Option<Checked<Deployment>>,
+    pub replayed: Option<Accepted<Deployment>>,
     /// Everything found, errors first.
     pub findings: Findings,
     /// Of each finding the shortest way to it from the start; empty: it needs none.
@@ -75,5 +75,5 @@ pub struct Report {
     /// What was left out: one bound each.
     pub left: Vec<String>,
     /// What it comes to.
-    pub verdict: Verdict,
+    pub verdict: CheckVerdict,
 }

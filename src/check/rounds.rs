@@ -1,8 +1,8 @@
-//! Frames that nobody ever undoes pile up where a circle pushes one each time round, until the oldest frames are squashed:
+//! Frames that nobody ever undoes pile up where a cycle pushes one each time round, until the oldest frames are squashed:
 //! what comes of that is followed too.
 //!
-//! A circle is gone round for each configuration that is pushed on it, in each world in which it is, up to a bound. What else
-//! is pushed on another circle with the same push in the same world is followed for that.
+//! A cycle is gone round for each configuration that is pushed on it, in each world in which it is, up to a bound. What else
+//! is pushed on another cycle with the same push in the same world is followed for that.
 
 use super::bound::Bound;
 use super::explore::{Edge, Graph, NOWHERE};
@@ -16,11 +16,11 @@ use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
 use std::collections::VecDeque;
 
-/// The edges of circles on which no undo fails, by where they come from.
-type Circular = FxHashMap<u32, SmallVec<[u32; 4]>>;
+/// The edges of cycles on which no undo fails, by where they come from.
+type Cyclic = FxHashMap<u32, SmallVec<[u32; 4]>>;
 
 impl Graph<'_, '_> {
-    /// Goes round circles that were met since. True: there is more to follow.
+    /// Goes round cycles that were met since. True: there is more to follow.
     pub(super) fn go_round(&mut self) -> bool {
         let mut pushes: Vec<_> = std::mem::take(&mut self.pushes).into_iter().collect();
         for (who, edges) in &mut pushes {
@@ -35,7 +35,7 @@ impl Graph<'_, '_> {
             return false;
         }
         pushes.sort_unstable_by_key(|((id, by), _)| (*id, *by));
-        let (circular, of) = self.circular();
+        let (cyclic, of) = self.cyclic();
         let before = self.edges.len();
         let easy = before <= limits::CHECK_EASY;
         let most = if easy { limits::CHECK_ROUNDS } else { 1 };
@@ -46,7 +46,7 @@ impl Graph<'_, '_> {
             for edge in edges {
                 let Edge { from, to, .. } = self.edges[edge as usize];
                 let (class, world) = (self.failed[from as usize], self.states[from as usize].world);
-                if of.get(&from).is_none_or(|circle| of.get(&to) != Some(circle)) {
+                if of.get(&from).is_none_or(|cycle| of.get(&to) != Some(cycle)) {
                     continue;
                 }
                 let gone = self.gone_round.entry((id, by)).or_default();
@@ -61,18 +61,18 @@ impl Graph<'_, '_> {
                     }
                     continue;
                 }
-                let circle = worsts.iter().find_map(|worst| {
-                    let circle = self.circle(edge, &circular, *worst)?;
-                    Some((circle, *worst))
+                let cycle = worsts.iter().find_map(|worst| {
+                    let cycle = self.cycle(edge, &cyclic, *worst)?;
+                    Some((cycle, *worst))
                 });
-                let Some((circle, worst)) = circle else {
+                let Some((cycle, worst)) = cycle else {
                     if !easy && piles {
                         self.cut(Bound::Rounds, class);
                     }
                     continue;
                 };
                 self.gone_round.entry((id, by)).or_default().insert(world);
-                if !self.round_and_round(&circle, worst) {
+                if !self.round_and_round(&cycle, worst) {
                     self.cut(Bound::Rounds, class.max(worst));
                 }
             }
@@ -80,8 +80,8 @@ impl Graph<'_, '_> {
         self.edges.len() > before
     }
 
-    /// The edges of circles on which no undo fails and something stays in force, and which states are on one circle.
-    fn circular(&self) -> (Circular, FxHashMap<u32, usize>) {
+    /// The edges of cycles on which no undo fails and something stays in force, and which states are on one cycle.
+    fn cyclic(&self) -> (Cyclic, FxHashMap<u32, usize>) {
         let fits = |edge: &Edge| {
             // Where nothing is left, frames are forgotten: they do not pile up.
             edge.failed <= Failed::Apply && edge.place.is_some() && self.states[edge.to as usize].world != EMPTY
@@ -91,17 +91,17 @@ impl Graph<'_, '_> {
         for (number, states) in kosaraju_scc(&DiGraph::<(), ()>::from_edges(all)).into_iter().enumerate() {
             of.extend(states.into_iter().filter_map(|at| Some((u32::try_from(at.index()).ok()?, number))));
         }
-        let mut circular = Circular::default();
+        let mut cyclic = Cyclic::default();
         for (number, edge) in (0u32..).zip(&self.edges) {
             if fits(edge) && of.get(&edge.from) == of.get(&edge.to) {
-                circular.entry(edge.from).or_default().push(number);
+                cyclic.entry(edge.from).or_default().push(number);
             }
         }
-        (circular, of)
+        (cyclic, of)
     }
 
-    /// The edges of a circle that ends with this one, on which nothing fails that is worse.
-    fn circle(&self, edge: u32, circular: &Circular, worst: Failed) -> Option<Vec<u32>> {
+    /// The edges of a cycle that ends with this one, on which nothing fails that is worse.
+    fn cycle(&self, edge: u32, cyclic: &Cyclic, worst: Failed) -> Option<Vec<u32>> {
         let Edge { from: goal, to: start, failed, .. } = self.edges[edge as usize];
         if failed > worst || self.failed[start as usize] > worst {
             return None;
@@ -110,17 +110,17 @@ impl Graph<'_, '_> {
         let mut queue: VecDeque<u32> = VecDeque::from([start]);
         while let Some(at) = queue.pop_front() {
             if at == goal {
-                let mut circle = vec![edge];
+                let mut cycle = vec![edge];
                 let mut at = goal;
                 while at != start {
                     let number = by[&at];
-                    circle.push(number);
+                    cycle.push(number);
                     at = self.edges[number as usize].from;
                 }
-                circle.reverse();
-                return Some(circle);
+                cycle.reverse();
+                return Some(cycle);
             }
-            for number in circular.get(&at).into_iter().flatten() {
+            for number in cyclic.get(&at).into_iter().flatten() {
                 let Edge { to, failed, .. } = self.edges[*number as usize];
                 if failed <= worst && to != start && !by.contains_key(&to) {
                     by.insert(to, *number);
@@ -131,15 +131,15 @@ impl Graph<'_, '_> {
         None
     }
 
-    /// Goes round a circle until the oldest frames are squashed, or something on it is refused; what it leads to is followed.
+    /// Goes round a cycle until the oldest frames are squashed, or something on it is refused; what it leads to is followed.
     /// False: it cannot be gone by what its requests come to alone.
-    fn round_and_round(&mut self, circle: &[u32], worst: Failed) -> bool {
-        let Some(first) = circle.first().map(|edge| self.edges[*edge as usize]) else { return false };
+    fn round_and_round(&mut self, cycle: &[u32], worst: Failed) -> bool {
+        let Some(first) = cycle.first().map(|edge| self.edges[*edge as usize]) else { return false };
         let Some(mut world) = self.product.worlds.get(self.states[first.from as usize].world).cloned() else {
             return false;
         };
         let mut requests: Vec<(Edge, Vec<Request>)> = Vec::new();
-        for number in circle {
+        for number in cycle {
             let edge = self.edges[*number as usize];
             let next = self.nexts(edge.from).all.into_iter().nth(edge.place.unwrap_or(NOWHERE) as usize);
             let answered = next.into_iter().flat_map(|next| next.answers);
@@ -179,8 +179,8 @@ impl Graph<'_, '_> {
         let (failed, depth) = (self.failed[at as usize].max(worst), self.depth[at as usize] + 1);
         let to = self.reach(state, failed, depth);
         let number = u32::try_from(self.edges.len()).unwrap_or(NOWHERE);
-        self.rounds.insert(number, circle.to_vec());
-        let shown = circle.iter().all(|edge| self.edges[*edge as usize].shown);
+        self.rounds.insert(number, cycle.to_vec());
+        let shown = cycle.iter().all(|edge| self.edges[*edge as usize].shown);
         let (place, by, barred) = (None, Move::Rounds, None);
         let edge = Edge { from: at, to, place, by, failed: worst, quiet: false, barred, dropped: false, shown };
         self.edges.push(edge);

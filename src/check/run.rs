@@ -5,12 +5,12 @@ use super::effort::Effort;
 use super::explore::explore;
 use super::judge::Traced;
 use super::product::Product;
-use super::report::{Checked, Explored, Report};
+use super::report::{Accepted, Explored, Report};
 use super::state::Failed;
-use super::verdict::Verdict;
+use super::verdict::CheckVerdict;
 use super::{
-    alone, beside, configurations as single, coordinator, declared, lets_go, library, monitors as watched, purity,
-    safety, settings, simulated, types, undriven, unheard, universe, unwatched, ways,
+    alone, configurations as single, coordinator, coupling, declared, lets_go, library, monitors as watched, purity,
+    safety, settings, simulated, types, undriven, unhandled, universe, unwatched, ways,
 };
 use crate::limits;
 use crate::model::codes::{CLASH, POST_ON_DESTROYED, PRE_ON_CREATED, TOUCHES_DESTROYED};
@@ -58,7 +58,7 @@ pub fn run_with(deployment: impl Into<Arc<Deployment>>, catalogue: &Catalogue, e
         let mut findings = watched::events(deployment, &charts);
         findings.extend(simulated::events(deployment, &charts));
         findings.extend(unwatched::check(deployment, &universe, &charts));
-        let of = |number| beside::view(deployment, &charts, number);
+        let of = |number| coupling::view(deployment, &charts, number);
         let views: Vec<Deployment> = (0..all).filter_map(of).collect();
         let told: BTreeSet<EventName> = charts
             .iter()
@@ -67,30 +67,30 @@ pub fn run_with(deployment: impl Into<Arc<Deployment>>, catalogue: &Catalogue, e
             .collect();
         for (view, chart) in views.iter().zip(&charts) {
             findings.extend(coordinator::check(view, chart, &told));
-            findings.extend(unheard::check(view, chart));
+            findings.extend(unhandled::check(view, chart));
             findings.extend(purity::check(view));
         }
         // Another one may wait for what starts and ends the deployment, and tell the others.
-        beside::forgive_unheard(deployment, &charts, &mut findings);
+        coupling::forgive_unheard(deployment, &charts, &mut findings);
         traced.extend(findings.into_iter().map(|finding| (finding, Vec::new())));
         // With wrong names in it, a configuration would be refused wherever it is asked for: that is said already.
         if !traced.iter().any(|(finding, _)| finding.is_error()) {
-            replayed = Some(Checked::new(shared.clone()));
+            replayed = Some(Accepted::new(shared.clone()));
             let followed = settings::followed(deployment, &universe);
             explored = follow(&followed, &views, &charts, catalogue, effort, &mut traced, &mut left);
             // Where there is an actuator, more is said of it.
             let said = |finding: &crate::model::Finding| {
                 traced.iter().any(|(f, _)| (f.code, f.origin.0) == (finding.code, finding.origin.0))
             };
-            let unheard: Findings = safety::unheard(deployment, &charts).into_iter().filter(|f| !said(f)).collect();
-            traced.extend(unheard.into_iter().map(|finding| (finding, Vec::new())));
+            let unhandled: Findings = safety::unhandled(deployment, &charts).into_iter().filter(|f| !said(f)).collect();
+            traced.extend(unhandled.into_iter().map(|finding| (finding, Vec::new())));
         }
     }
     traced.sort_by_key(|(finding, _)| Reverse(finding.severity));
     let (findings, traces): (Findings, Vec<_>) = traced.into_iter().unzip();
     let left: Vec<String> = left.into_iter().collect();
-    let verdict = Verdict::of(&findings, charts.len() == all, left.clone());
-    let checked = (verdict != Verdict::Refused).then(|| Checked::new(shared.clone()));
+    let verdict = CheckVerdict::of(&findings, charts.len() == all, left.clone());
+    let checked = (verdict != CheckVerdict::Refused).then(|| Accepted::new(shared.clone()));
     Report { checked, replayed, findings, traces, explored, left, verdict }
 }
 
@@ -121,12 +121,12 @@ fn follow(
         left.insert(bound.told(Failed::Nothing, 0, effort.transitions));
         explored.complete = false;
     }
-    let groups = beside::groups(deployment, charts);
-    if groups.len() > 1 && !beside::by_operator(deployment).is_empty() {
+    let groups = coupling::groups(deployment, charts);
+    if groups.len() > 1 && !coupling::by_operator(deployment).is_empty() {
         left.insert(Bound::Begun.told(Failed::Nothing, 0, effort.transitions));
         explored.complete = false;
     }
-    if beside::is_tied(deployment, charts, &groups) {
+    if coupling::is_tied(deployment, charts, &groups) {
         left.insert(Bound::Tied.told(Failed::Nothing, 0, effort.transitions));
         explored.complete = false;
     }
@@ -180,7 +180,7 @@ fn follow(
             graph.probe(&found);
             let cut = [Bound::Budget, Bound::Memory, Bound::Interrupted, Bound::Entered];
             let verified = !cut.iter().any(|bound| graph.bounds.contains_key(bound));
-            let shared = beside::shared(deployment, charts, &numbers, verified);
+            let shared = coupling::shared(deployment, charts, &numbers, verified);
             found.extend(shared.into_iter().map(|finding| (finding, Vec::new())));
             left.extend(
                 graph.bounds.iter().map(|(bound, failed)| bound.told(*failed, most_waiting, effort.transitions)),

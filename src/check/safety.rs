@@ -4,7 +4,7 @@ use super::coordinator::outside_events;
 use super::explore::Graph;
 use super::judge::Traced;
 use super::product::Product;
-use super::state::{Failed, Move, Next, State};
+use super::state::{Failed, Move, Next, ProductState};
 use crate::limits;
 use crate::model::codes::COORD_SAFETY_UNHEARD;
 use crate::model::finding::{count, did_you_mean};
@@ -14,7 +14,7 @@ use rustc_hash::{FxHashMap, FxHashSet};
 use std::collections::BTreeSet;
 
 /// Events that no coordinator listens to.
-pub(super) fn unheard(deployment: &Deployment, charts: &[&Chart]) -> Findings {
+pub(super) fn unhandled(deployment: &Deployment, charts: &[&Chart]) -> Findings {
     let event = |(event, at): &(EventName, Origin)| {
         let help = near(deployment, charts, *event)?;
         let message = format!("no coordinator waits for the safety event `{event}`");
@@ -38,7 +38,7 @@ impl Graph<'_, '_> {
         let events: Vec<_> = self.product.deployment.safety.clone();
         let order = self.in_order();
         // Where nothing comes from outside, it does not matter what came first.
-        let mut good: FxHashSet<State> = FxHashSet::default();
+        let mut good: FxHashSet<ProductState> = FxHashSet::default();
         let mut alike: FxHashMap<usize, (Vec<u32>, Vec<String>)> = FxHashMap::default();
         for (event, origin) in events {
             let mut known: FxHashSet<(Vec<NodeId>, u32)> = FxHashSet::default();
@@ -48,7 +48,7 @@ impl Graph<'_, '_> {
             let (mut bad, mut places) = said.clone().unwrap_or_default();
             for at in order.iter().filter(|_| said.is_none()) {
                 let state = &self.states[*at as usize];
-                let (world, settled) = (state.world, state.inbox.is_empty() && state.flight.is_empty());
+                let (world, settled) = (state.world, state.inbox.is_empty() && state.in_transit.is_empty());
                 if !settled || !self.product.worlds.has_actuator(world) || self.product.is_down(state) {
                     continue;
                 }
@@ -92,23 +92,23 @@ impl Graph<'_, '_> {
     }
 }
 
-fn is_asked(product: &Product<'_>, state: &State) -> bool {
+fn is_asked(product: &Product<'_>, state: &ProductState) -> bool {
     let is_safe = |ask: Ask| match ask {
         Ask::Apply(id) => product.worlds.configuration(id).is_some_and(|c| c.safe),
         _ => false,
     };
-    let in_flight = state.flight.iter().any(|batch| batch.requests.iter().any(|request| is_safe(request.ask)));
-    product.worlds.is_safe(state.world) || !state.safe.is_empty() || in_flight
+    let in_transit = state.in_transit.iter().any(|batch| batch.requests.iter().any(|request| is_safe(request.ask)));
+    product.worlds.is_safe(state.world) || !state.safe.is_empty() || in_transit
 }
 
 /// A way on which `event` does not lead to a safe configuration from this state, though nothing else comes from outside; none:
 /// on each it does. `good` are states from which every such way does.
 fn leads_elsewhere(
     product: &mut Product<'_>,
-    state: &State,
+    state: &ProductState,
     event: EventName,
-    good: &mut FxHashSet<State>,
-) -> Option<Vec<(State, Next)>> {
+    good: &mut FxHashSet<ProductState>,
+) -> Option<Vec<(ProductState, Next)>> {
     if is_asked(product, state) {
         return None;
     }
@@ -135,21 +135,21 @@ fn leads_elsewhere(
 
 /// Ways on which nothing comes from outside.
 struct Walk<'g> {
-    good: &'g mut FxHashSet<State>,
+    good: &'g mut FxHashSet<ProductState>,
     /// So many moves come from outside, at the beginning.
     begins: usize,
     /// The moves so far, each with the state before it.
-    way: Vec<(State, Next)>,
+    way: Vec<(ProductState, Next)>,
 }
 
 impl Walk<'_> {
     /// Whether every way from here comes to a safe configuration; else `way` is one that does not.
-    fn leads(&mut self, product: &mut Product<'_>, state: &State) -> bool {
+    fn leads(&mut self, product: &mut Product<'_>, state: &ProductState) -> bool {
         if is_asked(product, state) || self.good.contains(state) {
             return true;
         }
         // Round and round, or too far to be an answer to an emergency.
-        if self.way.len() > limits::CHECK_CIRCLE || self.way.iter().skip(self.begins).any(|(before, _)| before == state)
+        if self.way.len() > limits::CHECK_CYCLE || self.way.iter().skip(self.begins).any(|(before, _)| before == state)
         {
             return false;
         }

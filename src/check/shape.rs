@@ -1,8 +1,8 @@
 //! Which frames of a stack count, and in what order: what makes two stacks one for whoever asks.
 
-use super::alike::{FrameBook, FrameNumber};
+use super::equivalence::{FrameBook, FrameNumber};
 use crate::model::ConfigId;
-use crate::stack::{Frame, FrameId, Requester, Stack, is_kept, staying};
+use crate::stack::{Frame, FrameId, Requester, Stack, calls, is_kept, staying};
 use crate::system::Slot;
 use rustc_hash::FxHashSet;
 use std::sync::Arc;
@@ -83,18 +83,23 @@ impl Shapes {
         let counts: Vec<bool> = frames.iter().map(|frame| self.undone.counts(frame)).collect();
         self.orders.note(frames, &counts);
         let mut kept: Vec<(&Arc<Frame>, Counted)> = Vec::new();
+        let others: Vec<Arc<Frame>> =
+            frames.iter().zip(&counts).filter(|(_, counts)| !**counts).map(|(frame, _)| frame.clone()).collect();
+        let mut below = 0;
         for (i, frame) in frames.iter().enumerate() {
             if !counts[i] {
+                below += 1;
                 continue;
             }
-            let above: Vec<Arc<Frame>> = frames[i + 1..].iter().filter(|f| !self.undone.counts(f)).cloned().collect();
-            let over: FxHashSet<Slot> = above.iter().flat_map(|f| f.saved.iter().map(|s| s.slot)).collect();
-            let mut handed: Vec<Slot> = frame.saved.iter().map(|s| s.slot).filter(|slot| over.contains(slot)).collect();
-            let others: Vec<Arc<Frame>> = frames.iter().filter(|f| !self.undone.counts(f)).cloned().collect();
-            handed.extend(staying(frame, &others));
+            let above = &others[below..];
+            let over = |slot: &Slot| above.iter().any(|f| f.saved.iter().any(|s| s.slot == *slot));
+            let mut handed: Vec<Slot> = frame.saved.iter().map(|s| s.slot).filter(over).collect();
+            if calls(frame).next().is_some() {
+                handed.extend(staying(frame, &others));
+            }
             handed.sort_unstable();
             handed.dedup();
-            let blocked = !above.is_empty() && is_kept(frame, above.into_iter());
+            let blocked = !above.is_empty() && is_kept(frame, above.iter().cloned());
             kept.push((frame, (self.frames.number(frame), blocked, handed)));
         }
         // Where it may come to squashing, the oldest go first. A stack that is not half full is far from that.

@@ -1,9 +1,9 @@
 //! Which moves of a way a script can bring about, as far as each of them tells by itself: one thing happens at a time, and what
 //! comes by itself comes as soon as it can.
 
-use super::outcome::Beside;
+use super::outcome::ConcurrentWork;
 use super::product::Product;
-use super::state::{Move, Next, State};
+use super::state::{Move, Next, ProductState};
 use crate::limits;
 use crate::model::Verdict;
 use crate::stack::{Request, Why};
@@ -20,7 +20,7 @@ pub struct Shows {
     /// Nothing is known any more, and what is answered is up to the platform.
     unknown: bool,
     /// Somebody has not heard yet what came before.
-    unheard: bool,
+    unhandled: bool,
     /// The numbers of batches under way that have nothing to do.
     idle: SmallVec<[u32; 2]>,
 }
@@ -30,13 +30,14 @@ pub(super) const AT_ONCE: &str = "what has nothing to do is answered at once";
 
 impl Product<'_> {
     /// What a state lets a script bring about next.
-    pub fn shows(&mut self, state: &State) -> Shows {
+    pub fn shows(&mut self, state: &ProductState) -> Shows {
         let mut idle: SmallVec<[u32; 2]> = SmallVec::new();
         let unknown = self.worlds.top(state.world).is_some();
         if state.safe.is_empty() && !unknown {
-            let numbers: SmallVec<[u32; 4]> = state.desk.under_way().iter().map(|turn| turn.number).collect();
+            let numbers: SmallVec<[u32; 4]> = state.desk.under_way().iter().map(|active| active.number).collect();
             for number in numbers.into_iter().filter(|number| !state.is_stopped(*number)) {
-                let requests = state.desk.turn_of(number).map(|turn| turn.batch.requests.clone()).unwrap_or_default();
+                let requests =
+                    state.desk.active(number).map(|active| active.batch.requests.clone()).unwrap_or_default();
                 if !self.comes(state, number, &requests).can_fail.contains(&true) {
                     idle.push(number);
                 }
@@ -44,11 +45,11 @@ impl Product<'_> {
         }
         let waits = state.desk.waiting().next().is_some();
         Shows {
-            nothing: !state.flight.is_empty() || waits && too_late(state),
+            nothing: !state.in_transit.is_empty() || waits && too_late(state),
             at_once: !idle.is_empty(),
             answers: state.safe.is_empty() && goes_back(state),
             unknown,
-            unheard: self.is_told_between(state),
+            unhandled: self.is_told_between(state),
             idle,
         }
     }
@@ -56,10 +57,10 @@ impl Product<'_> {
 
 impl Product<'_> {
     /// Whether what is asked for, again and again, has nothing to do, so that no time ever passes from there on.
-    pub(super) fn never_rests(&mut self, state: &State) -> bool {
-        let mut seen: Vec<State> = Vec::new();
+    pub(super) fn never_rests(&mut self, state: &ProductState) -> bool {
+        let mut seen: Vec<ProductState> = Vec::new();
         let mut at = state.clone();
-        while seen.len() <= limits::CHECK_CIRCLE {
+        while seen.len() <= limits::CHECK_CYCLE {
             if seen.contains(&at) {
                 return true;
             }
@@ -80,18 +81,18 @@ impl Shows {
     }
 
     /// Whether a move answers only what has nothing to do.
-    fn answers_idle(&self, before: &State, next: &Next) -> bool {
+    fn answers_idle(&self, before: &ProductState, next: &Next) -> bool {
         let idle = |(request, _): &(Request, Verdict)| {
-            let turns = before.desk.under_way().iter();
-            let mut own = turns.filter(|turn| turn.batch.requests.contains(request));
-            !before.safe.contains(request) && own.all(|turn| self.idle.contains(&turn.number))
+            let active_batches = before.desk.under_way().iter();
+            let mut own = active_batches.filter(|active| active.batch.requests.contains(request));
+            !before.safe.contains(request) && own.all(|active| self.idle.contains(&active.number))
         };
         next.answers.iter().all(idle)
     }
 
     /// Whether a script can bring this about.
-    pub fn shows(&self, product: &Product<'_>, before: &State, next: &Next) -> bool {
-        if self.nothing || !next.state.flight.is_empty() {
+    pub fn shows(&self, product: &Product<'_>, before: &ProductState, next: &Next) -> bool {
+        if self.nothing || !next.state.in_transit.is_empty() {
             return false;
         }
         // Most states have nothing under way.
@@ -101,7 +102,7 @@ impl Shows {
             // How much has come is seen by nobody: in a script all has.
             Move::Taken(number, event) => product.takes_in_turn(before, &next.state, usize::from(number), event),
             Move::Answer => {
-                let own_time = (self.unheard || self.at_once) && !self.answers_idle(before, next);
+                let own_time = (self.unhandled || self.at_once) && !self.answers_idle(before, next);
                 // What is taken back unconfirmed may have to wait for what is under way.
                 let waits =
                     next.answers.iter().any(|(_, verdict)| *verdict == Verdict::Reverted) && !before.desk.is_empty();
@@ -111,32 +112,32 @@ impl Shows {
                 !self.unknown && !own_time && !waits && !behind && !races()
             }
             Move::Lost(id) if product.loss(before, id).is_none() => false,
-            _ => !self.at_once && !self.answers && !self.unheard && !races(),
+            _ => !self.at_once && !self.answers && !self.unhandled && !races(),
         }
     }
 }
 
 /// The requests of each batch under way, and each safe configuration that is being applied.
-pub(super) fn under_way(state: &State) -> Vec<SmallVec<[Request; 2]>> {
-    let batches = state.desk.under_way().iter().map(|turn| turn.batch.requests.clone());
+pub(super) fn under_way(state: &ProductState) -> Vec<SmallVec<[Request; 2]>> {
+    let batches = state.desk.under_way().iter().map(|active| active.batch.requests.clone());
     batches.chain(state.safe.iter().map(|request| SmallVec::from_iter([*request]))).collect()
 }
 
 /// How a batch goes that a state has under way: alone, where it takes along what stands in its way.
-pub(super) fn goes(state: &State, requests: &[Request]) -> Beside {
+pub(super) fn goes(state: &ProductState, requests: &[Request]) -> ConcurrentWork {
     let one =
         |of: &Request| requests.iter().any(|request| same(std::slice::from_ref(of), std::slice::from_ref(request)));
-    let turn = state.desk.under_way().iter().find(|turn| turn.batch.requests.iter().any(one));
-    Beside { alone: turn.is_some_and(|turn| turn.alone), ..Beside::default() }
+    let active = state.desk.under_way().iter().find(|active| active.batch.requests.iter().any(one));
+    ConcurrentWork { alone: active.is_some_and(|active| active.alone), ..ConcurrentWork::default() }
 }
 
 /// Whether something is under way that was interrupted, or given up.
-pub(super) fn goes_back(state: &State) -> bool {
+pub(super) fn goes_back(state: &ProductState) -> bool {
     !state.interrupted.is_empty() || state.undos().next().is_some()
 }
 
 /// Whether an undo came too late to give up what is still under way: it waits for it.
-pub(super) fn too_late(state: &State) -> bool {
+pub(super) fn too_late(state: &ProductState) -> bool {
     let waits = |undo: &Request| {
         let of = |batch: SmallVec<[Request; 2]>| crate::stack::given_up_of(undo, &batch).is_some();
         under_way(state).into_iter().any(of)
@@ -145,10 +146,10 @@ pub(super) fn too_late(state: &State) -> bool {
 }
 
 /// Whether what is stopped is through all the same, or what was under way turns out not to have begun.
-pub(super) fn races(before: &State, next: &Next) -> bool {
+pub(super) fn races(before: &ProductState, next: &Next) -> bool {
     let through = |(request, verdict): &(Request, Verdict)| {
-        let of = before.desk.under_way().iter().find(|turn| turn.batch.requests.contains(request));
-        verdict.is_success() && of.is_some_and(|turn| before.is_stopped(turn.number))
+        let of = before.desk.under_way().iter().find(|active| active.batch.requests.contains(request));
+        verdict.is_success() && of.is_some_and(|active| before.is_stopped(active.number))
     };
     let back = |requests: &SmallVec<[Request; 2]>| {
         let waits = next.state.desk.waiting().any(|batch| same(&batch.requests, requests));
@@ -173,7 +174,7 @@ pub(super) fn races(before: &State, next: &Next) -> bool {
 }
 
 /// Whether a move answers all of a batch. An answer on its way is of something that has not begun, whoever asks for the same.
-pub(super) fn answered(before: &State, next: &Next, batch: &[Request]) -> bool {
+pub(super) fn answered(before: &ProductState, next: &Next, batch: &[Request]) -> bool {
     if before.due.first().is_some_and(|due| next.answers[..] == [*due]) {
         return false;
     }

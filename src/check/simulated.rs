@@ -9,19 +9,19 @@ use crate::model::{
     ChangeKind, ComponentName, Deployment, Finding, Findings, MemberRef, Origin, SimulatedReaction, StepFault,
 };
 use crate::statechart::Chart;
-use crate::system::Member;
+use crate::system::MemberClass;
 use std::collections::BTreeSet;
 
 /// The steps that are done to a component as a whole.
 const WHOLE: [&str; 6] = ["create", "destroy", "configure", "start", "stop", "cleanup"];
 
 /// The steps that are done to one of its members.
-const PARTS: [(&str, Member); 5] = [
-    ("connect", Member::Port),
-    ("disconnect", Member::Port),
-    ("property_set", Member::Property),
-    ("port_write", Member::Port),
-    ("operation_call", Member::Operation),
+const PARTS: [(&str, MemberClass); 5] = [
+    ("connect", MemberClass::Port),
+    ("disconnect", MemberClass::Port),
+    ("property_set", MemberClass::Property),
+    ("port_write", MemberClass::Port),
+    ("operation_call", MemberClass::Operation),
 ];
 
 /// What is wrong with the names.
@@ -200,7 +200,7 @@ fn unreadable(at: Origin, operand: &str, what: &str, example: &str) -> Finding {
 }
 
 /// What is wrong with a member that a step is done to.
-fn member(at: Origin, verb: &str, part: Member, operand: &str, universe: &Universe) -> Findings {
+fn member(at: Origin, verb: &str, part: MemberClass, operand: &str, universe: &Universe) -> Findings {
     let Ok(member) = MemberRef::new(operand) else {
         return vec![unreadable(at, operand, "a member of a component", &format!("{verb} radio.channel"))];
     };

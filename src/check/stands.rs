@@ -3,14 +3,14 @@
 //! Run states are known of a world; what ports carry and activities count is not, and is taken to speak for it. So it is the
 //! monitors' own evaluator that decides: what is false even then cannot come true before the configuration's time is over.
 
-use super::beside;
+use super::coupling;
 use super::declared::is_unseen;
 use super::members::requester;
 use crate::limits;
 use crate::model::codes::CONF_HOLDS_NEVER;
 use crate::model::monitor::{Condition, ConditionKind};
 use crate::model::{Ask, ComponentName, ConfigId, Configuration, Deployment, Finding, RequestId, RunState, Target};
-use crate::monitor::{Bank, Input, Sample, state_value};
+use crate::monitor::{Bank, InputSample, MonitorInput, state_value};
 use crate::stack::claims::{Claims, components};
 use crate::stack::{Request, Requester};
 use crate::statechart::Chart;
@@ -30,7 +30,7 @@ pub fn judged(deployment: &Deployment, charts: &[&Chart]) -> (FxHashSet<ConfigId
     }
     let claims = Claims::new(deployment.configurations.iter());
     let names = deployment.coordinators.iter().map(|coordinator| requester(coordinator.name));
-    let asked = charts.iter().map(|chart| beside::asked(deployment, chart));
+    let asked = charts.iter().map(|chart| coupling::asked(deployment, chart));
     let operator = (Requester::Operator, deployment.operator_applies().collect());
     let by: Vec<(Requester, BTreeSet<ConfigId>)> = names.zip(asked).chain([operator]).collect();
     let alone = by.iter().filter(|(_, ids)| !ids.is_empty()).count() < 2;
@@ -104,16 +104,18 @@ fn comes_true(condition: &Condition, system: &System, patience: Duration) -> Opt
     let mut bank = Bank::alone(condition, now);
     let inputs = bank.inputs().to_vec();
     let state = |component: &ComponentName| system.component(*component).map(|node| node.state);
-    let of = |input: &Input| match input {
-        Input::State(component) => state(component).map(state_value),
-        Input::Faulted(component) => state(component).map(|state| f64::from(u8::from(state == RunState::Faulted))),
-        Input::Port(_) | Input::Activity { .. } => None,
+    let of = |input: &MonitorInput| match input {
+        MonitorInput::State(component) => state(component).map(state_value),
+        MonitorInput::Faulted(component) => {
+            state(component).map(|state| f64::from(u8::from(state == RunState::Faulted)))
+        }
+        MonitorInput::Port(_) | MonitorInput::Activity { .. } => None,
     };
-    let samples: Vec<Sample> = inputs
+    let samples: Vec<InputSample> = inputs
         .iter()
         .map(|input| {
             let value = of(input);
-            Sample { value: value.unwrap_or_default(), at: now, writes: 0, present: value.is_some() }
+            InputSample { value: value.unwrap_or_default(), at: now, writes: 0, present: value.is_some() }
         })
         .collect();
     for _ in 0..limits::CHECK_STANDS {

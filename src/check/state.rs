@@ -1,7 +1,7 @@
 //! The states of the product, and the moves between them.
 
-use super::few::{Few, Shared};
 use super::outcome::WorldId;
+use super::shared_list::{Shared, SharedList};
 use crate::model::codes::{STACK_EMPTY, STACK_NO_FRAME};
 use crate::model::{Ask, ComponentName, ConfigId, Findings, Verdict};
 use crate::stack::{Batch, Desk, Request, Requester, Why};
@@ -45,7 +45,7 @@ pub struct Unconfirmed {
 
 /// A state of the product.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub struct State {
+pub struct ProductState {
     /// Where each coordinator is.
     pub leaves: SmallVec<[NodeId; 2]>,
     /// System and stack.
@@ -53,30 +53,30 @@ pub struct State {
     /// What waits and what is under way.
     pub desk: Shared<Desk>,
     /// Batches under way that are interrupted.
-    pub interrupted: Few<Interrupted>,
+    pub interrupted: SharedList<Interrupted>,
     /// Batches under way that were begun as one, of which some requests were answered since.
-    pub joined: Few<u32>,
+    pub joined: SharedList<u32>,
     /// Batches under way whose pushes found their place only where frames can be squashed: what others hold on to since does
     /// not take it away.
-    pub placed: Few<u32>,
+    pub placed: SharedList<u32>,
     /// Safe configurations that are being applied, in their order.
-    pub safe: Few<Request>,
+    pub safe: SharedList<Request>,
     /// Answers on their way.
-    pub due: Few<(Request, Verdict)>,
+    pub due: SharedList<(Request, Verdict)>,
     /// Answers that are given and not heard yet; where coordinators hear them at once, none in a state between moves.
-    pub telling: Few<(Request, Verdict)>,
+    pub telling: SharedList<(Request, Verdict)>,
     /// An undo that waited was cancelled by a safe configuration, and its frame stays; false in a state between moves.
     pub stayed: bool,
     /// Events on their way to a coordinator, those of one in order.
-    pub inbox: Few<(u8, EventId)>,
+    pub inbox: SharedList<(u8, EventId)>,
     /// Frames that wait for their confirmation.
-    pub unconfirmed: Few<Unconfirmed>,
+    pub unconfirmed: SharedList<Unconfirmed>,
     /// Configurations that were lost, and are not applied anew.
-    pub lost: Few<ConfigId>,
+    pub lost: SharedList<ConfigId>,
     /// Components that ran when something in force was applied, and that what it stands for looks at.
-    pub stands: Few<(ConfigId, ComponentName)>,
+    pub stands: SharedList<(ConfigId, ComponentName)>,
     /// Configurations in force of which one of those was stopped since: what they stand for is watched no more.
-    pub over: Few<ConfigId>,
+    pub over: SharedList<ConfigId>,
     /// Frames whose undo has failed were set aside: they may be there ([`undo_failed`](super::undo_failed)).
     pub aside: bool,
     /// Coordinators that have come to *down* and asked for nothing since, by their bits.
@@ -91,14 +91,14 @@ pub struct State {
     /// One came meanwhile.
     pub across: bool,
     /// Batches on their way, the first of which would stop what is under way: what it would stop ends before.
-    pub flight: Few<Batch>,
+    pub in_transit: SharedList<Batch>,
 }
 
-impl State {
+impl ProductState {
     /// Batches of a requester that are not answered. That it has come to *down* once counts for nothing.
     pub fn outstanding(&self, by: Requester) -> usize {
         let first = |batch: &&Batch| batch.requests.first().is_some_and(|request| request.requester == by);
-        let under_way = self.desk.under_way().iter().map(|turn| &turn.batch);
+        let under_way = self.desk.under_way().iter().map(|active| &active.batch);
         let (downs, batches): (Vec<&Batch>, Vec<&Batch>) =
             under_way.chain(self.desk.waiting()).filter(first).partition(|batch| batch.requests[0].why == Why::Down);
         let due = usize::from(self.is_owed(by));
@@ -114,7 +114,7 @@ impl State {
 
     /// Undos that give something up.
     pub fn undos(&self) -> impl Iterator<Item = &Request> {
-        self.desk.under_way().iter().flat_map(|turn| turn.given_up.iter().map(|given_up| &given_up.undo))
+        self.desk.under_way().iter().flat_map(|active| active.given_up.iter().map(|given_up| &given_up.undo))
     }
 
     /// Whether a batch under way is interrupted.
@@ -129,12 +129,12 @@ impl State {
 
     /// Whether a batch under way is interrupted, or something of it was given up.
     pub fn is_stopped(&self, number: u32) -> bool {
-        self.interrupted(number).is_some() || self.desk.turn_of(number).is_some_and(|turn| !turn.given_up.is_empty())
+        self.interrupted(number).is_some() || self.desk.active(number).is_some_and(|active| !active.given_up.is_empty())
     }
 
     /// How many requests are not answered.
     pub fn waiting(&self) -> usize {
-        let under_way: usize = self.desk.under_way().iter().map(|turn| turn.batch.requests.len()).sum();
+        let under_way: usize = self.desk.under_way().iter().map(|active| active.batch.requests.len()).sum();
         self.desk.len() + under_way + self.safe.len() + self.due.len() + self.undos().count()
     }
 
@@ -145,7 +145,7 @@ impl State {
             && self.due.is_empty()
             && self.telling.is_empty()
             && self.inbox.is_empty()
-            && self.flight.is_empty()
+            && self.in_transit.is_empty()
     }
 }
 
@@ -170,12 +170,23 @@ pub enum Move {
     Operator(Ask),
     /// Coordinators that have nothing to do with these are down as well.
     OthersDown,
-    /// The same circle again and again, until frames are squashed.
+    /// The same cycle again and again, until frames are squashed.
     Rounds,
 }
 
 /// The answers that a move gives.
-pub type Answers = SmallVec<[(Request, Verdict); 2]>;
+pub type Answers = SmallVec<[(Request, Verdict); 1]>;
+
+/// Reactions of the simulated platform, by their places among them.
+pub type Reacts = SmallVec<[u16; 2]>;
+
+/// States, mostly one.
+pub type States = SmallVec<[ProductState; 1]>;
+
+/// One of them.
+pub fn one(state: ProductState) -> States {
+    SmallVec::from_buf([state])
+}
 
 /// A state that follows.
 #[derive(Debug, Clone)]
@@ -185,7 +196,7 @@ pub struct Next {
     /// The answers given.
     pub answers: Answers,
     /// The state.
-    pub state: State,
+    pub state: ProductState,
     /// What failed.
     pub failed: Failed,
     /// A configuration of which there are more frames than are followed, and more than are followed behind undoings that
@@ -203,7 +214,7 @@ pub enum Trouble {
     /// The request can only fail: what it stands for is false when it has been applied.
     Hollow(Request, Rc<Findings>),
     /// Nobody hears that this is lost, or was taken back unconfirmed.
-    Unheard(ConfigId, Verdict),
+    Unhandled(ConfigId, Verdict),
 }
 
 impl Trouble {
@@ -231,12 +242,12 @@ pub struct Nexts {
 
 impl Next {
     /// A state that comes without an answer.
-    pub(super) fn plain(by: Move, state: State, failed: Failed) -> Self {
+    pub(super) fn plain(by: Move, state: ProductState, failed: Failed) -> Self {
         Self::answered(by, Answers::new(), state, failed)
     }
 
     /// A state that comes with answers.
-    pub(super) fn answered(by: Move, answers: Answers, mut state: State, failed: Failed) -> Self {
+    pub(super) fn answered(by: Move, answers: Answers, mut state: ProductState, failed: Failed) -> Self {
         let failed = if std::mem::take(&mut state.stayed) { failed.max(Failed::Undo) } else { failed };
         Self { by, answers, state, failed, deep: (None, None), by_hand: false }
     }

@@ -2,7 +2,8 @@
 
 use super::product::Product;
 use super::shows::goes;
-use super::state::{Move, Next, State};
+use super::state::{Move, Next, ProductState, Reacts};
+use super::world::plain;
 use crate::model::{Ask, ConfigId, EventName, SimulatedReaction, StepPattern, Verdict};
 use crate::stack::Request;
 use crate::statechart::{EventId, NodeId};
@@ -72,7 +73,7 @@ impl<'a> Product<'a> {
     }
 
     /// What runs in a state, but for what components report; of time events with the state of the coordinator.
-    fn running(&self, state: &State) -> SmallVec<[(Timer, Option<NodeId>); 4]> {
+    fn running(&self, state: &ProductState) -> SmallVec<[(Timer, Option<NodeId>); 4]> {
         let mut all = SmallVec::new();
         for (number, member) in self.members.iter().enumerate() {
             let inside = std::iter::successors(Some(state.leaves[number]), |at| member.chart.parent(*at));
@@ -88,13 +89,13 @@ impl<'a> Product<'a> {
     }
 
     /// What is to wait for where everything that has a time may just have begun.
-    pub(super) fn waits_in(&self, state: &State) -> Waits {
+    pub(super) fn waits_in(&self, state: &ProductState) -> Waits {
         let all = self.running(state).into_iter();
         all.map(|(timer, _)| Wait { timer, left: self.lasts_whole(timer), sooner: true }).collect()
     }
 
     /// Whether answers in a state may have to be waited for.
-    pub(super) fn may_wait(&self, state: &State) -> bool {
+    pub(super) fn may_wait(&self, state: &ProductState) -> bool {
         self.running(state).iter().any(|(timer, _)| !matches!(timer, Timer::Time(..)))
     }
 
@@ -146,7 +147,7 @@ impl<'a> Product<'a> {
     /// move took.
     pub(super) fn waits_after(
         &self,
-        (before, timers, after): (&State, &[Timer], &State),
+        (before, timers, after): (&ProductState, &[Timer], &ProductState),
         left: &[(usize, NodeId)],
         waits: &[Wait],
     ) -> (Waits, Duration) {
@@ -170,7 +171,7 @@ impl<'a> Product<'a> {
     }
 
     /// What is to wait for after a move, and how long it took.
-    pub(super) fn waits_behind(&mut self, before: &State, next: &Next, waits: &[Wait]) -> (Waits, Duration) {
+    pub(super) fn waits_behind(&mut self, before: &ProductState, next: &Next, waits: &[Wait]) -> (Waits, Duration) {
         let left = self.left_by(before, next);
         let timers = self.timers_of(next, waits);
         let (mut after, took) = self.waits_after((before, &timers, &next.state), &left, waits);
@@ -195,14 +196,37 @@ impl<'a> Product<'a> {
     }
 
     /// Whether such a step is done when these requests are carried out.
-    pub(super) fn does_step(&self, before: &State, next: &Next, pattern: &StepPattern) -> bool {
-        let done = next.answers.iter().filter(|(_, verdict)| verdict.is_success());
-        let requests: Vec<Request> = done.map(|(request, _)| *request).collect();
+    pub(super) fn does_step(&self, before: &ProductState, next: &Next, pattern: &StepPattern) -> bool {
+        let requests = succeeded(next);
         if requests.is_empty() {
             return false;
         }
         let steps = self.worlds.steps(before.world, &requests, &goes(before, &requests));
         steps.iter().any(|planned| pattern.matches(&planned.step))
+    }
+
+    /// Reactions of the simulated platform, by their places among them, whose step is done when what a move answers is carried out.
+    pub(super) fn reacts(&mut self, before: &ProductState, next: &Next) -> Reacts {
+        if !self.deployment.kind.imitates || self.deployment.reactions.is_empty() {
+            return Reacts::new();
+        }
+        let requests = succeeded(next);
+        if requests.is_empty() {
+            return Reacts::new();
+        }
+        let goes = goes(before, &requests);
+        let key = (before.world, plain(&requests), goes);
+        if let Some(known) = self.reacts.get(&key) {
+            return known.clone();
+        }
+        let steps = self.worlds.steps(before.world, &requests, &key.2);
+        let all = self.deployment.reactions.iter().enumerate().filter(|(_, reaction)| {
+            let pattern = StepPattern::new(&reaction.after);
+            steps.iter().any(|planned| pattern.matches(&planned.step))
+        });
+        let all: Reacts = all.filter_map(|(at, _)| u16::try_from(at).ok()).collect();
+        self.reacts.insert(key, all.clone());
+        all
     }
 
     /// What is waited for, for words.
@@ -225,4 +249,10 @@ impl<'a> Product<'a> {
         let chart = self.members[number].chart;
         chart.nodes().find(|state| chart.time_event(*state) == Some(event))
     }
+}
+
+/// The requests that a move answers with success.
+fn succeeded(next: &Next) -> Vec<Request> {
+    let done = next.answers.iter().filter(|(_, verdict)| verdict.is_success());
+    done.map(|(request, _)| *request).collect()
 }

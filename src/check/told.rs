@@ -2,14 +2,14 @@
 
 use super::arrive::is_for_somebody;
 use super::product::Product;
-use super::state::{Move, Next, State};
-use super::trace::{Answered, Happened, Hears, Place};
+use super::state::{Move, Next, ProductState};
+use super::trace::{Answered, Happened, HeardEvent, Place};
 use crate::model::{Ask, EventName, Verdict};
 use crate::statechart::{EventId, NodeId};
 
 impl Product<'_> {
     /// Where all coordinators are.
-    pub fn places(&self, state: &State) -> Vec<Place> {
+    pub fn places(&self, state: &ProductState) -> Vec<Place> {
         let several = self.deployment.coordinators.len() > 1;
         let place = |(member, leaf): (&super::members::Member<'_>, &crate::statechart::NodeId)| Place {
             coordinator: several.then(|| member.name.to_string()),
@@ -19,13 +19,13 @@ impl Product<'_> {
     }
 
     /// Where all of them are, in words.
-    pub fn place(&self, state: &State) -> String {
+    pub fn place(&self, state: &ProductState) -> String {
         let all: Vec<usize> = (0..self.members.len()).collect();
         self.place_of(state, &all)
     }
 
     /// Where these are, in words.
-    pub fn place_of(&self, state: &State, numbers: &[usize]) -> String {
+    pub fn place_of(&self, state: &ProductState, numbers: &[usize]) -> String {
         let told = |place: Place| match place.coordinator {
             Some(name) => format!("{name}:{}", place.state),
             None => place.state,
@@ -35,10 +35,10 @@ impl Product<'_> {
     }
 
     /// What coordinators hear with a move, in order, as it is told.
-    pub fn hears(&mut self, before: &State, next: &Next) -> Vec<Hears> {
+    pub fn hears(&mut self, before: &ProductState, next: &Next) -> Vec<HeardEvent> {
         let heard = self.heard(before, next);
         let several = self.deployment.coordinators.len() > 1;
-        let told = |(number, event): (usize, EventId)| Hears {
+        let told = |(number, event): (usize, EventId)| HeardEvent {
             coordinator: several.then(|| self.members[number].name.to_string()),
             event: self.members[number].chart.event_text(event),
         };
@@ -46,7 +46,7 @@ impl Product<'_> {
     }
 
     /// The states that coordinators leave with a move.
-    pub(super) fn left_by(&mut self, before: &State, next: &Next) -> Vec<(usize, NodeId)> {
+    pub(super) fn left_by(&mut self, before: &ProductState, next: &Next) -> Vec<(usize, NodeId)> {
         let (mut leaves, mut left) = (before.leaves.clone(), Vec::new());
         for (number, event) in self.heard(before, next) {
             let reaction = self.members[number].react(leaves[number], event);
@@ -57,7 +57,7 @@ impl Product<'_> {
     }
 
     /// What coordinators hear with a move, in order. Where several hear of one thing, each hears it when it takes it.
-    fn heard(&mut self, before: &State, next: &Next) -> Vec<(usize, EventId)> {
+    fn heard(&mut self, before: &ProductState, next: &Next) -> Vec<(usize, EventId)> {
         let mut heard: Vec<(usize, EventId)> = Vec::new();
         let all = |name: EventName| {
             let charts = self.members.iter().map(|member| member.chart.event(name)).enumerate();
@@ -79,7 +79,7 @@ impl Product<'_> {
                 let mut left: Vec<(usize, u64)> = Vec::new();
                 for (request, verdict) in &next.answers {
                     let Some(number) = self.member(request.requester) else { continue };
-                    let event = self.members[number].chart.event(verdict.event(request.ask));
+                    let event = self.members[number].answer(request.ask, *verdict);
                     let owner = request.tag.0.checked_sub(1);
                     let gone = owner.is_some_and(|owner| left.contains(&(number, owner)));
                     if gone || !is_for_somebody(request) || event == EventId::OTHER {

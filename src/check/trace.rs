@@ -16,10 +16,10 @@ pub struct TraceStep {
     pub states: Vec<Place>,
     /// What coordinators hear then, in order: each is stepped alone by that.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub hears: Vec<Hears>,
+    pub hears: Vec<HeardEvent>,
     /// What a script does to bring it about.
     #[serde(skip)]
-    pub replay: Replay,
+    pub replay: MoveReplay,
 }
 
 /// Where a coordinator is.
@@ -34,7 +34,7 @@ pub struct Place {
 
 /// What a coordinator hears.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Hears {
+pub struct HeardEvent {
     /// The coordinator; none: there is only this one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub coordinator: Option<String>,
@@ -111,7 +111,7 @@ pub struct Answered {
 
 /// What a move of a way needs.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Replay {
+pub struct MoveReplay {
     /// When it happens, from the beginning.
     pub at: Duration,
     /// What is armed before it: the text of a step, how it goes, and how long it takes.
@@ -124,14 +124,14 @@ pub struct Replay {
     pub passes: bool,
     /// Answers that may be others, and lead to the same: what was given up and has nothing to do may be through before.
     pub either: SmallVec<[EventName; 1]>,
-    /// A circle is gone round.
+    /// A cycle is gone round.
     pub again: Option<Again>,
     /// For which coordinators alone something is raised; or where those that are not followed with these are to be, each with
     /// its name before it.
     pub others: Vec<String>,
 }
 
-/// A circle that is gone round again and again.
+/// A cycle that is gone round again and again.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Again {
     /// So many times.

@@ -2,7 +2,7 @@
 
 use super::members::Member;
 use super::product::Product;
-use super::state::{Next, State};
+use super::state::{Next, ProductState};
 use super::timers::Timer;
 use crate::model::{EventName, Findings};
 use crate::stack::Request;
@@ -11,7 +11,7 @@ use std::time::Duration;
 
 /// A way: states with what leads to them.
 pub struct Way {
-    pub from: State,
+    pub from: ProductState,
     pub moves: Vec<Next>,
     pub reached: bool,
     pub refused: Option<(Request, Findings)>,
@@ -39,7 +39,7 @@ pub struct Tried {
 
 impl Way {
     /// The state at the end.
-    pub fn end(&self) -> &State {
+    pub fn end(&self) -> &ProductState {
         self.moves.last().map_or(&self.from, |next| &next.state)
     }
 }

@@ -56,14 +56,14 @@ pub fn check(deployment: &Deployment, catalogue: &Catalogue) -> Findings {
             }
         }
     }
-    findings.extend(circles(deployment, catalogue));
+    findings.extend(cycles(deployment, catalogue));
     findings.extend(without_code(deployment, catalogue));
     findings
 }
 
 /// Orders that lead back to where they begin: inside a feedback loop none of these types could come first, and the name would
 /// decide.
-fn circles(deployment: &Deployment, catalogue: &Catalogue) -> Findings {
+fn cycles(deployment: &Deployment, catalogue: &Catalogue) -> Findings {
     let mut findings = Findings::new();
     for (key, others) in [
         ("start_after", (|ty| &ty.start_after) as fn(&ComponentType) -> &Vec<TypeName>),

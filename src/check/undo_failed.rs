@@ -16,7 +16,7 @@
 use super::aside::Aside;
 use super::outcome::{Went, WorldId};
 use super::product::Product;
-use super::state::State;
+use super::state::ProductState;
 use super::world::Worlds;
 use crate::model::{Ask, ConfigId, RequestId};
 use crate::stack::claims::Claims;
@@ -25,12 +25,12 @@ use smallvec::SmallVec;
 use std::sync::Arc;
 
 /// A configuration, and who asked for it.
-type Whose = (ConfigId, Requester);
+pub(super) type Whose = (ConfigId, Requester);
 
 impl Product<'_> {
     /// These undos have failed: the states in which that may be followed on.
-    pub(super) fn undos_failed(&mut self, state: State, failed: &[Request]) -> SmallVec<[State; 2]> {
-        let mut states: SmallVec<[State; 2]> = SmallVec::from_iter([state]);
+    pub(super) fn undos_failed(&mut self, state: ProductState, failed: &[Request]) -> SmallVec<[ProductState; 2]> {
+        let mut states: SmallVec<[ProductState; 2]> = SmallVec::from_iter([state]);
         for request in failed {
             let Ask::UndoOf(id) = request.ask else { continue };
             let stays = (id, request.requester);
@@ -41,7 +41,7 @@ impl Product<'_> {
         states
     }
 
-    fn undo_failed(&mut self, state: State, stays: Whose) -> SmallVec<[State; 2]> {
+    fn undo_failed(&mut self, state: ProductState, stays: Whose) -> SmallVec<[ProductState; 2]> {
         let left = self.worlds.left_over(state.world, &self.aside);
         // What is left of the same, or of what touches the same, belongs together.
         let meets = |other: &Whose| *other == stays || meet(&self.worlds.claims, other.0, stays.0);
@@ -56,9 +56,9 @@ impl Product<'_> {
     }
 
     /// A state as if what was left of these had been undone; none: that cannot be by itself.
-    fn without(&mut self, state: &State, gone: &[Whose]) -> Option<State> {
+    fn without(&mut self, state: &ProductState, gone: &[Whose]) -> Option<ProductState> {
         let went = self.worlds.without(state.world, gone)?;
-        let mut state = State { aside: true, ..state.clone() };
+        let mut state = ProductState { aside: true, ..state.clone() };
         self.go(&mut state, &went);
         Some(state)
     }
@@ -101,6 +101,16 @@ impl Worlds<'_> {
 
     /// The world in which what was left of these was undone; none: something cannot be, or belongs to a state.
     fn without(&mut self, id: WorldId, gone: &[Whose]) -> Option<Went> {
+        let key = (id, SmallVec::from_slice(gone));
+        if let Some(known) = self.withouts.get(&key) {
+            return known.clone();
+        }
+        let went = self.undone(id, gone);
+        self.withouts.insert(key, went.clone());
+        went
+    }
+
+    fn undone(&mut self, id: WorldId, gone: &[Whose]) -> Option<Went> {
         let mut world = self.get(id)?.clone();
         for whose in gone {
             let of = |frame: &&Arc<Frame>| (frame.configuration, frame.requester) == *whose;

@@ -6,7 +6,7 @@ use crate::model::{
     Catalogue, ChangeKind, ComponentName, ComponentType, ConfigId, Deployment, Effect, Finding, MemberRef, Origin,
     TypeName,
 };
-use crate::system::{Member, Picture, Violation};
+use crate::system::{MemberClass, Picture, Violation};
 use rustc_hash::{FxHashMap, FxHashSet};
 use smallvec::{SmallVec, smallvec};
 use std::sync::Arc;
@@ -139,7 +139,7 @@ impl Universe {
 
     /// The finding that the component has no such member, whichever it may be created as. None also when one of its types
     /// is unknown, which is said where it is created.
-    pub fn lacks(&self, what: Member, member: MemberRef, at: Origin) -> Option<Finding> {
+    pub fn lacks(&self, what: MemberClass, member: MemberRef, at: Origin) -> Option<Finding> {
         let creations = self.of(member.component);
         let has = |c: &Creation| c.description.as_ref().is_none_or(|ty| what.is_in(ty, member.member));
         if creations.iter().any(has) {

@@ -6,7 +6,7 @@ use serde::Serialize;
 /// What a check comes to: the first that applies of refused, warnings, followed, sound.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Verdict {
+pub enum CheckVerdict {
     /// Everything was followed, and nothing was found but notes.
     Sound,
     /// Nothing was found but notes, as far as it was followed.
@@ -20,7 +20,7 @@ pub enum Verdict {
     Refused,
 }
 
-impl Verdict {
+impl CheckVerdict {
     /// What these findings come to. `whole`: there was something to follow; `left` tells what was left out.
     pub(super) fn of(findings: &[Finding], whole: bool, left: Vec<String>) -> Self {
         if finding::has_errors(findings) || !whole {

@@ -2,30 +2,30 @@
 
 use super::explore::{Edge, Graph, NOWHERE, Ways};
 use super::product::Product;
-use super::state::{Failed, Move, Next, State};
-use super::trace::{Again, Happened, Replay, TraceStep};
+use super::state::{Failed, Move, Next, ProductState};
+use super::trace::{Again, Happened, MoveReplay, TraceStep};
 use crate::limits;
 use crate::stack::Request;
 use smallvec::SmallVec;
 use std::collections::VecDeque;
 
 /// What happens on a way.
-enum Part {
+enum WayStep {
     /// A move.
-    Move(Box<(State, Next)>),
-    /// A circle is gone round so many times, and where that leads.
-    Rounds(usize, Vec<(State, Next)>, Box<State>),
+    Move(Box<(ProductState, Next)>),
+    /// A cycle is gone round so many times, and where that leads.
+    Rounds(usize, Vec<(ProductState, Next)>, Box<ProductState>),
 }
 
 impl Product<'_> {
     /// The beginning of each way, as it is told.
-    pub(super) fn begins(&self, start: &State) -> TraceStep {
+    pub(super) fn begins(&self, start: &ProductState) -> TraceStep {
         let states = self.places(start);
-        TraceStep { what: Happened::Start, states, hears: Vec::new(), replay: Replay::default() }
+        TraceStep { what: Happened::Start, states, hears: Vec::new(), replay: MoveReplay::default() }
     }
 
     /// A move as a step of a way.
-    pub(super) fn step(&mut self, before: &State, next: &Next, replay: Replay) -> TraceStep {
+    pub(super) fn step(&mut self, before: &ProductState, next: &Next, replay: MoveReplay) -> TraceStep {
         let (what, states) = (self.told(next), self.places(&next.state));
         TraceStep { what, states, hears: self.hears(before, next), replay }
     }
@@ -38,55 +38,58 @@ impl Graph<'_, '_> {
     }
 
     /// The same, and on to where these moves lead from there, each with the state before it.
-    pub fn trace_on(&mut self, at: u32, more: Vec<(State, Next)>) -> Vec<TraceStep> {
-        let mut parts: Vec<Part> = Vec::new();
+    pub fn trace_on(&mut self, at: u32, more: Vec<(ProductState, Next)>) -> Vec<TraceStep> {
+        let mut parts: Vec<WayStep> = Vec::new();
         for number in self.edges_to(at) {
             let edge = self.edges[number as usize];
             let from = self.states[edge.from as usize].clone();
             let rounds = if edge.place.is_none() { self.rounds_of(number) } else { None };
             parts.push(match rounds {
-                Some((times, circle)) => {
-                    let circle = circle.iter().map(|number| self.gone(*number)).collect();
-                    Part::Rounds(times, circle, Box::new(self.states[edge.to as usize].clone()))
+                Some((times, cycle)) => {
+                    let cycle = cycle.iter().map(|number| self.gone(*number)).collect();
+                    WayStep::Rounds(times, cycle, Box::new(self.states[edge.to as usize].clone()))
                 }
-                None => Part::Move(Box::new((from, self.gone(number).1))),
+                None => WayStep::Move(Box::new((from, self.gone(number).1))),
             });
         }
-        parts.extend(more.into_iter().map(|pair| Part::Move(Box::new(pair))));
+        parts.extend(more.into_iter().map(|pair| WayStep::Move(Box::new(pair))));
         self.told_of(&parts)
     }
 
     /// The steps of a way.
-    fn told_of(&mut self, parts: &[Part]) -> Vec<TraceStep> {
-        let mut pairs: Vec<(&State, &Next)> = Vec::new();
+    fn told_of(&mut self, parts: &[WayStep]) -> Vec<TraceStep> {
+        let mut pairs: Vec<(&ProductState, &Next)> = Vec::new();
         for part in parts {
             match part {
-                Part::Move(pair) => pairs.push((&pair.0, &pair.1)),
-                Part::Rounds(times, circle, _) => {
+                WayStep::Move(pair) => pairs.push((&pair.0, &pair.1)),
+                WayStep::Rounds(times, cycle, _) => {
                     // The first and the last one may differ from those between: what is under way begins before, or ends later.
                     for _ in 0..(*times).min(limits::REPLAY_ROUNDS) {
-                        pairs.extend(circle.iter().map(|pair| (&pair.0, &pair.1)));
+                        pairs.extend(cycle.iter().map(|pair| (&pair.0, &pair.1)));
                     }
                 }
             }
         }
         let mut replays = self.product.replay(&pairs).into_iter();
         let product = &mut *self.product;
-        let mut step =
-            |pair: &(State, Next), replay: Option<Replay>| product.step(&pair.0, &pair.1, replay.unwrap_or_default());
+        let mut step = |pair: &(ProductState, Next), replay: Option<MoveReplay>| {
+            product.step(&pair.0, &pair.1, replay.unwrap_or_default())
+        };
         let mut steps = Vec::new();
         for part in parts {
             match part {
-                Part::Move(pair) => steps.push(step(pair, replays.next())),
-                Part::Rounds(times, circle, to) => {
-                    let gone = (*times).min(limits::REPLAY_ROUNDS) * circle.len();
-                    let moves = circle.iter().cycle().take(gone);
+                WayStep::Move(pair) => steps.push(step(pair, replays.next())),
+                WayStep::Rounds(times, cycle, to) => {
+                    let gone = (*times).min(limits::REPLAY_ROUNDS) * cycle.len();
+                    let moves = cycle.iter().cycle().take(gone);
                     let all: Vec<TraceStep> = moves.map(|pair| step(pair, replays.next())).collect();
                     let at = all.last().map(|step| step.replay.at).unwrap_or_default();
-                    let again = Again { times: *times, round: circle.len(), steps: all };
+                    let again = Again { times: *times, round: cycle.len(), steps: all };
                     let to = Next::plain(Move::Rounds, (**to).clone(), Failed::Nothing);
-                    let told =
-                        step(&(to.state.clone(), to), Some(Replay { at, again: Some(again), ..Replay::default() }));
+                    let told = step(
+                        &(to.state.clone(), to),
+                        Some(MoveReplay { at, again: Some(again), ..MoveReplay::default() }),
+                    );
                     steps.push(TraceStep { what: Happened::Rounds { times: *times }, ..told });
                 }
             }
@@ -111,7 +114,7 @@ impl Graph<'_, '_> {
     }
 
     /// The move that an edge is, with the state before it.
-    pub(super) fn gone(&mut self, number: u32) -> (State, Next) {
+    pub(super) fn gone(&mut self, number: u32) -> (ProductState, Next) {
         let Edge { from, to, place, .. } = self.edges[number as usize];
         let next = place.and_then(|place| self.nexts(from).all.into_iter().nth(place as usize));
         let (before, state) = (self.states[from as usize].clone(), self.states[to as usize].clone());
@@ -166,15 +169,15 @@ impl Graph<'_, '_> {
         by
     }
 
-    /// How many times a circle is gone round from where an edge begins that is no move, and by which edges; none: it does not
+    /// How many times a cycle is gone round from where an edge begins that is no move, and by which edges; none: it does not
     /// lead there by going round whole.
     fn rounds_of(&mut self, number: u32) -> Option<(usize, Vec<u32>)> {
         let Edge { from, to, .. } = self.edges[number as usize];
-        let mut circle = self.rounds.get(&number)?.clone();
-        let first = circle.iter().position(|edge| self.edges[*edge as usize].from == from)?;
-        circle.rotate_left(first);
+        let mut cycle = self.rounds.get(&number)?.clone();
+        let first = cycle.iter().position(|edge| self.edges[*edge as usize].from == from)?;
+        cycle.rotate_left(first);
         let mut requests: Vec<Vec<Request>> = Vec::new();
-        for edge in &circle {
+        for edge in &cycle {
             let answers = self.gone(*edge).1.answers;
             requests.push(answers.into_iter().filter(|(_, v)| v.is_success()).map(|(request, _)| request).collect());
         }
@@ -185,7 +188,7 @@ impl Graph<'_, '_> {
                 return None;
             }
             if self.product.worlds.met(world.clone()) == wanted {
-                return Some((times, circle));
+                return Some((times, cycle));
             }
         }
         None

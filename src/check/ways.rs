@@ -4,7 +4,7 @@ use super::closed::still_comes;
 use super::drive;
 use super::judge::Traced;
 use super::product::Product;
-use super::state::{Next, State};
+use super::state::{Next, ProductState};
 use super::timers::Timer;
 use super::trace::TraceStep;
 use super::tried::Way;
@@ -62,7 +62,7 @@ pub fn ways(product: &mut Product<'_>) -> Traced {
 /// The ways one after the other, as a trace from the start.
 fn trace(product: &mut Product<'_>, ways: &[&Way]) -> Vec<TraceStep> {
     let mut steps = Vec::new();
-    let mut pairs: Vec<(&State, &Next)> = Vec::new();
+    let mut pairs: Vec<(&ProductState, &Next)> = Vec::new();
     for way in ways {
         let mut from = &way.from;
         for next in &way.moves {
@@ -180,7 +180,7 @@ fn waits_at(product: &Product<'_>, timer: Timer) -> Origin {
     }
 }
 
-fn leftovers(product: &Product<'_>, end: &State) -> Option<Finding> {
+fn leftovers(product: &Product<'_>, end: &ProductState) -> Option<Finding> {
     let mut left = Vec::new();
     product.worlds.get(end.world)?.system.for_each_component(&mut |node| left.push(node.name.to_string()));
     left.sort();

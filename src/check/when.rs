@@ -3,7 +3,7 @@
 use super::loss::Loss;
 use super::product::Product;
 use super::replay::{Begun, Split};
-use super::state::{Move, Next, State};
+use super::state::{Move, Next, ProductState};
 use crate::limits;
 use crate::model::{Ask, ConfigId, Verdict};
 use crate::stack::Request;
@@ -15,7 +15,7 @@ pub(super) type Entries = Vec<Vec<(usize, NodeId)>>;
 
 impl Product<'_> {
     /// What is entered with each move.
-    pub(super) fn entries(&mut self, way: &[(&State, &Next)]) -> Entries {
+    pub(super) fn entries(&mut self, way: &[(&ProductState, &Next)]) -> Entries {
         let mut all = Entries::new();
         for (before, next) in way {
             let left = self.left_by(before, next);
@@ -36,7 +36,7 @@ impl Product<'_> {
     /// When each move happens.
     pub(super) fn times(
         &self,
-        way: &[(&State, &Next)],
+        way: &[(&ProductState, &Next)],
         begun: &[Begun],
         split: &Split,
         entries: &Entries,
@@ -96,7 +96,13 @@ impl Product<'_> {
     }
 
     /// Whether a time is over before a move comes: that of the move itself, which comes late, or another one, which comes first.
-    pub(super) fn is_overdue(&self, way: &[(&State, &Next)], k: usize, times: &[Duration], entries: &Entries) -> bool {
+    pub(super) fn is_overdue(
+        &self,
+        way: &[(&ProductState, &Next)],
+        k: usize,
+        times: &[Duration],
+        entries: &Entries,
+    ) -> bool {
         let (before, next) = way[k];
         let over = |number: usize, node: NodeId| {
             let chart = self.members[number].chart;
@@ -106,7 +112,7 @@ impl Product<'_> {
                 return due < times[k];
             }
             let entered = entries[..k].iter().rposition(|of| of.contains(&(number, node))).map_or(0, |at| at + 1);
-            let own = |(_, next): &(&State, &Next)| next.by == Move::Time(super::state::index(number), event);
+            let own = |(_, next): &(&ProductState, &Next)| next.by == Move::Time(super::state::index(number), event);
             due <= times[k] && !way[entered..k].iter().any(own)
         };
         let timed = |(number, member): (usize, &super::members::Member<'_>)| {
@@ -117,7 +123,13 @@ impl Product<'_> {
     }
 
     /// When the frame whose confirmation did not come is taken back.
-    fn applied_at(&self, way: &[(&State, &Next)], times: &[Duration], before: usize, ask: Ask) -> Option<Duration> {
+    fn applied_at(
+        &self,
+        way: &[(&ProductState, &Next)],
+        times: &[Duration],
+        before: usize,
+        ask: Ask,
+    ) -> Option<Duration> {
         let Ask::Apply(id) = ask else { return None };
         let within = self.worlds.configuration(id)?.confirm?.within;
         let applied = |k: &usize| way[*k].1.answers.iter().any(|(r, verdict)| r.ask == ask && *verdict == Verdict::Ok);

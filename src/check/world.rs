@@ -7,14 +7,15 @@
 //!
 //! After *broken* nothing is known any more: that is a world of its own ([`Top`]).
 
-use super::alike::{hash_system, same_system};
-use super::outcome::{Beside, Comes, Held, SafeComes, Went, WorldId};
+use super::equivalence::{hash_system, same_system};
+use super::outcome::{Comes, ConcurrentWork, Held, SafeComes, Went, WorldId};
 use super::shape::{Counted, Shapes, Undone};
+use super::undo_failed::Whose;
 use crate::limits;
 use crate::model::{Ask, Catalogue, ConfigId, Configuration, Deployment, RequestId};
-use crate::plan::{Context, Refusal, plan};
+use crate::plan::{PlanContext, Refusal, plan};
 use crate::stack::claims::Claims;
-use crate::stack::{Effort, FrameId, Reason, Request, Requester, Rules, SafeEnd, Stack, World, effort, take_up};
+use crate::stack::{BestEffort, FrameId, Reason, Request, Requester, Rules, SafeEnd, Stack, World, effort, take_up};
 use crate::system::{System, View, step};
 use crate::time::Time;
 use rustc_hash::{FxHashMap, FxHashSet, FxHasher};
@@ -33,7 +34,7 @@ pub struct Top {
     pub actuator: bool,
 }
 
-enum Known {
+enum Knowledge {
     Exact(Box<Exact>),
     Top(Top),
 }
@@ -52,17 +53,18 @@ pub struct Worlds<'a> {
     operator: FxHashSet<ConfigId>,
     /// What requests may touch, by their text.
     pub claims: Claims,
-    context: Context,
+    context: PlanContext,
     shapes: Shapes,
     /// Places of frames are wanted: there are configurations that must be confirmed.
     confirms: bool,
-    worlds: Vec<Known>,
+    worlds: Vec<Knowledge>,
     index: FxHashMap<u64, SmallVec<[WorldId; 1]>>,
     /// The first world with each system.
     systems: FxHashMap<u64, SmallVec<[WorldId; 1]>>,
-    pub(super) comes: FxHashMap<(WorldId, SmallVec<[Request; 2]>, Beside), Rc<Comes>>,
+    pub(super) comes: FxHashMap<(WorldId, SmallVec<[Request; 2]>, ConcurrentWork), Rc<Comes>>,
     safes: FxHashMap<(WorldId, Request, Held), Rc<SafeComes>>,
-    pub(super) helds: FxHashMap<(WorldId, SmallVec<[Request; 2]>, Beside), Held>,
+    pub(super) helds: FxHashMap<(WorldId, SmallVec<[Request; 2]>, ConcurrentWork), Held>,
+    pub(super) withouts: FxHashMap<(WorldId, SmallVec<[Whose; 2]>), Option<Went>>,
     pub(super) asked: FxHashSet<ConfigId>,
     /// Configurations of which it can be told whether what they stand for is true.
     pub(super) judged: FxHashSet<ConfigId>,
@@ -74,8 +76,8 @@ pub(super) fn plain(requests: &[Request]) -> SmallVec<[Request; 2]> {
 }
 
 /// The context in which a deployment's configurations are planned.
-pub fn context(deployment: &Deployment) -> Context {
-    Context { activities: deployment.activities.keys().copied().collect::<BTreeSet<_>>(), avoid: BTreeSet::new() }
+pub fn context(deployment: &Deployment) -> PlanContext {
+    PlanContext { activities: deployment.activities.keys().copied().collect::<BTreeSet<_>>(), avoid: BTreeSet::new() }
 }
 
 impl<'a> Worlds<'a> {
@@ -95,19 +97,20 @@ impl<'a> Worlds<'a> {
             comes: FxHashMap::default(),
             safes: FxHashMap::default(),
             helds: FxHashMap::default(),
+            withouts: FxHashMap::default(),
             asked: FxHashSet::default(),
             judged: FxHashSet::default(),
         };
         let system = System::new(Arc::new(catalogue.clone()));
-        worlds.intern(World::new(system, Stack::new(deployment.limits.stack)));
+        worlds.intern(World::new(system, Stack::remembering(deployment.limits.stack)));
         worlds
     }
 
     /// The world of that number; none: it is not known.
     pub fn get(&self, id: WorldId) -> Option<&World> {
         match &self.worlds[id as usize] {
-            Known::Exact(exact) => Some(&exact.world),
-            Known::Top(_) => None,
+            Knowledge::Exact(exact) => Some(&exact.world),
+            Knowledge::Top(_) => None,
         }
     }
 
@@ -121,7 +124,7 @@ impl<'a> Worlds<'a> {
             return *id;
         }
         let id = self.next();
-        self.worlds.push(Known::Top(top));
+        self.worlds.push(Knowledge::Top(top));
         self.index.entry(hash).or_default().push(id);
         id
     }
@@ -129,36 +132,36 @@ impl<'a> Worlds<'a> {
     /// The numbers of the frames that count, in their order.
     pub(super) fn ids(&self, id: WorldId) -> &[FrameId] {
         match &self.worlds[id as usize] {
-            Known::Exact(exact) => &exact.ids,
-            Known::Top(_) => &[],
+            Knowledge::Exact(exact) => &exact.ids,
+            Knowledge::Top(_) => &[],
         }
     }
 
     /// What is known of a world that is not known.
     pub fn top(&self, id: WorldId) -> Option<Top> {
         match &self.worlds[id as usize] {
-            Known::Exact(_) => None,
-            Known::Top(top) => Some(*top),
+            Knowledge::Exact(_) => None,
+            Knowledge::Top(top) => Some(*top),
         }
     }
 
     /// Whether a safe configuration is in force.
     pub fn is_safe(&self, id: WorldId) -> bool {
         match &self.worlds[id as usize] {
-            Known::Exact(exact) => exact.world.stack.safe().next().is_some(),
-            Known::Top(top) => top.safe,
+            Knowledge::Exact(exact) => exact.world.stack.safe().next().is_some(),
+            Knowledge::Top(top) => top.safe,
         }
     }
 
     /// Whether there is, or may be, an actuator.
     pub fn has_actuator(&self, id: WorldId) -> bool {
         match &self.worlds[id as usize] {
-            Known::Exact(exact) => {
+            Knowledge::Exact(exact) => {
                 let mut some = false;
                 exact.world.system.for_each_component(&mut |node| some |= node.ty.actuator);
                 some
             }
-            Known::Top(top) => top.actuator,
+            Knowledge::Top(top) => top.actuator,
         }
     }
 
@@ -192,7 +195,7 @@ impl<'a> Worlds<'a> {
         self.asked.insert(configuration);
         let Some(before) = self.get(id) else { unreachable!("planned in a world that is known") };
         let configuration = &self.configurations[&configuration];
-        let Effort { planned, frame, troubles } =
+        let BestEffort { planned, frame, troubles } =
             effort(&before.system, &before.stack, configuration, request, Time::default(), &self.context);
         let mut world = before.clone();
         planned.steps.iter().for_each(|planned| step::effect(&planned.step, &mut world.system));
@@ -309,7 +312,7 @@ impl<'a> Worlds<'a> {
     }
 
     pub(super) fn went(&mut self, from: WorldId, world: World, pushed: &[FrameId]) -> Went {
-        let (deep, left) = (self.more_than(limits::CHECK_FRAMES, &world), self.more_than(limits::CHECK_LEFT, &world));
+        let [deep, left] = self.more_than([limits::CHECK_FRAMES, limits::CHECK_LEFT], &world);
         if !self.confirms {
             return Went { world: self.intern(world), places: None, pushed: SmallVec::new(), deep, left };
         }
@@ -323,17 +326,29 @@ impl<'a> Worlds<'a> {
         Went { world, places: Some(Rc::new(places)), pushed, deep, left }
     }
 
-    /// A configuration of which one requester has more frames than that. Those of another one come of other rounds.
-    fn more_than(&self, most: usize, world: &World) -> Option<ConfigId> {
-        let mut counts: FxHashMap<(ConfigId, Requester), usize> = FxHashMap::default();
-        let frames =
-            world.stack.frames().iter().filter(|frame| self.shapes.undone.counts(frame) && !frame.is_squashed());
-        let deep = frames.into_iter().find(|frame| {
-            let count = counts.entry((frame.configuration, frame.requester)).or_default();
-            *count += 1;
-            *count > most
-        });
-        deep.map(|frame| frame.configuration)
+    /// Of each of these bounds, a configuration of which one requester has more frames than that. Those of another one come of
+    /// other rounds.
+    fn more_than(&self, most: [usize; 2], world: &World) -> [Option<ConfigId>; 2] {
+        let mut counts: SmallVec<[((ConfigId, Requester), usize); 16]> = SmallVec::new();
+        let mut deep = [None; 2];
+        let frames = world.stack.frames().iter();
+        for frame in frames.filter(|frame| self.shapes.undone.counts(frame) && !frame.is_squashed()) {
+            let key = (frame.configuration, frame.requester);
+            let count = match counts.iter_mut().find(|(of, _)| *of == key) {
+                Some((_, count)) => {
+                    *count += 1;
+                    *count
+                }
+                None => {
+                    counts.push((key, 1));
+                    1
+                }
+            };
+            for (deep, most) in deep.iter_mut().zip(most) {
+                *deep = deep.or((count > most).then_some(frame.configuration));
+            }
+        }
+        deep
     }
 
     fn intern(&mut self, world: World) -> WorldId {
@@ -348,11 +363,11 @@ impl<'a> Worlds<'a> {
         counted.hash(&mut hasher);
         let hash = hasher.finish();
         let same = |id: &&WorldId| match &self.worlds[**id as usize] {
-            Known::Exact(exact) => {
+            Knowledge::Exact(exact) => {
                 let same = exact.counted == counted && (!self.shapes.undone.in_order || exact.ids == ids);
                 same && same_system(&exact.world.system, &world.system)
             }
-            Known::Top(_) => false,
+            Knowledge::Top(_) => false,
         };
         if let Some(id) = self.index.get(&hash).and_then(|ids| ids.iter().find(same)) {
             return *id;
@@ -361,14 +376,14 @@ impl<'a> Worlds<'a> {
         // Most worlds differ in their frames only.
         let like = self.systems.entry(of_system).or_default();
         let known = |id: &&WorldId| match &self.worlds[**id as usize] {
-            Known::Exact(exact) => same_system(&exact.world.system, &world.system),
-            Known::Top(_) => false,
+            Knowledge::Exact(exact) => same_system(&exact.world.system, &world.system),
+            Knowledge::Top(_) => false,
         };
         match like.iter().find(known).map(|id| &self.worlds[*id as usize]) {
-            Some(Known::Exact(exact)) => world.system.share_with(&exact.world.system),
+            Some(Knowledge::Exact(exact)) => world.system.share_with(&exact.world.system),
             _ => like.push(id),
         }
-        self.worlds.push(Known::Exact(Box::new(Exact { world, counted, ids })));
+        self.worlds.push(Knowledge::Exact(Box::new(Exact { world, counted, ids })));
         self.index.entry(hash).or_default().push(id);
         id
     }

@@ -1,6 +1,6 @@
 //! How much `davit check` follows, and what is told meanwhile: a line on the terminal, the memory that is left, Ctrl-C.
 
-use super::Failure;
+use super::CommandFailure;
 use crate::check::{Far, Halt};
 use crate::limits;
 use crate::model::codes::CLI_MEMORY_UNKNOWN;
@@ -125,9 +125,9 @@ impl Following {
     ///
     /// # Errors
     /// The operating system does not tell how much memory is taken up, and that is bounded.
-    pub fn new(budget: CheckBudget, silent: bool) -> Result<Self, Failure> {
+    pub fn new(budget: CheckBudget, silent: bool) -> Result<Self, CommandFailure> {
         if budget.memory.is_some() && taken_up().is_none() {
-            return Err(Failure::usage(
+            return Err(CommandFailure::usage(
                 CLI_MEMORY_UNKNOWN,
                 "the system does not tell how much memory this process takes up",
                 "give `--budget` a number of transitions",

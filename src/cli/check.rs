@@ -2,10 +2,10 @@
 
 use super::budget::{CheckBudget, Following};
 use super::exit::Exit;
-use super::input::Input;
+use super::input::CommandInput;
 use super::output::Style;
-use super::{Answer, Context, Failure, Run, replay};
-use crate::check::{self, Effort, Explored, Report, TraceStep, Verdict, why_no_way};
+use super::{CommandContext, CommandFailure, CommandResult, Run, replay};
+use crate::check::{self, CheckVerdict, Effort, Explored, Report, TraceStep, why_no_way};
 use crate::diagnostics::{SourceMap, to_json};
 use crate::limits::{CHECK_FRAMES, CHECK_LEFT, CHECK_PILED};
 use crate::model::codes::CLI_WHICH_COORDINATOR;
@@ -29,7 +29,7 @@ use std::path::PathBuf;
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
-    input: Input,
+    input: CommandInput,
     /// Print JSON: `ok`, `verdict`, `findings` (each with its `trace`), `explored`.
     #[arg(long)]
     json: bool,
@@ -57,7 +57,7 @@ pub struct Args {
 }
 
 impl Run for Args {
-    fn run(self, context: &Context) -> Answer {
+    fn run(self, context: &CommandContext) -> CommandResult {
         let read = match self.input.read(context) {
             Ok(read) => read,
             Err(failure) if self.json => {
@@ -68,7 +68,7 @@ impl Run for Args {
                     findings: failure.findings,
                     explored: Explored::default(),
                     left: Vec::new(),
-                    verdict: Verdict::Refused,
+                    verdict: CheckVerdict::Refused,
                 };
                 print_json(context, &report, &failure.sources);
                 return Ok(failure.exit);
@@ -92,9 +92,9 @@ impl Run for Args {
         report.findings.extend(read.findings);
         report.traces.resize(report.findings.len(), Vec::new());
         let no = match report.verdict {
-            Verdict::Refused => true,
-            Verdict::Sound => false,
-            Verdict::Followed { .. } | Verdict::Warnings => self.strict || interrupted,
+            CheckVerdict::Refused => true,
+            CheckVerdict::Sound => false,
+            CheckVerdict::Followed { .. } | CheckVerdict::Warnings => self.strict || interrupted,
         };
         let exit = if no { Exit::No } else { Exit::Done };
         if self.json {
@@ -124,9 +124,9 @@ impl Run for Args {
             out.error("`--notes` shows notes whole, `--trace N` the way to one\n");
         }
         let style = match report.verdict {
-            Verdict::Sound | Verdict::Followed { .. } => Style::Good,
-            Verdict::Warnings => Style::Care,
-            Verdict::Refused => Style::Bad,
+            CheckVerdict::Sound | CheckVerdict::Followed { .. } => Style::Good,
+            CheckVerdict::Warnings => Style::Care,
+            CheckVerdict::Refused => Style::Bad,
         };
         let (verdict, name) = (out.paint(style, report.verdict.text()), out.paint(Style::Bold, read.deployment.name));
         let explored = report.explored;
@@ -152,7 +152,14 @@ impl Run for Args {
 
 impl Args {
     /// The way to the N-th finding, counted from 1, shown or as a script.
-    fn way(&self, context: &Context, deployment: &Deployment, report: &Report, number: usize, exit: Exit) -> Answer {
+    fn way(
+        &self,
+        context: &CommandContext,
+        deployment: &Deployment,
+        report: &Report,
+        number: usize,
+        exit: Exit,
+    ) -> CommandResult {
         let found = number.checked_sub(1).and_then(|at| Some((report.findings.get(at)?, report.traces.get(at)?)));
         let Some((finding, trace)) = found else {
             let there = report.findings.len();
@@ -186,13 +193,13 @@ impl Args {
     }
 
     /// Which coordinator is stepped alone; none: there is only one.
-    fn alone(&self, deployment: &Deployment) -> Result<Option<&str>, Failure> {
+    fn alone(&self, deployment: &Deployment) -> Result<Option<&str>, CommandFailure> {
         let names: Vec<&str> = deployment.coordinators.iter().map(|c| c.name.as_str()).collect();
         let several = names.len() > 1;
         match self.of.as_deref() {
             Some(of) if names.contains(&of) => Ok(several.then_some(of)),
             None if !several => Ok(None),
-            of => Err(Failure::usage(
+            of => Err(CommandFailure::usage(
                 CLI_WHICH_COORDINATOR,
                 match of {
                     Some(of) => format!("there is no coordinator `{of}`"),
@@ -204,7 +211,7 @@ impl Args {
     }
 }
 
-fn show_way(context: &Context, finding: &Finding, trace: &[TraceStep], exit: Exit) -> Exit {
+fn show_way(context: &CommandContext, finding: &Finding, trace: &[TraceStep], exit: Exit) -> Exit {
     context.out.line(format!("{}: {}", finding.code, finding.message));
     if trace.is_empty() {
         context.out.line(format!("  {}", why_no_way(finding.code)));
@@ -234,7 +241,7 @@ fn first_trace(report: &Report, notes: bool) -> Option<(usize, &[TraceStep])> {
     worth.next().map(|(number, (_, trace))| (number, trace.as_slice()))
 }
 
-fn print_json(context: &Context, report: &Report, sources: &SourceMap) {
+fn print_json(context: &CommandContext, report: &Report, sources: &SourceMap) {
     let mut findings = to_json(&report.findings, sources);
     if let Some(findings) = findings.as_array_mut() {
         for (finding, trace) in findings.iter_mut().zip(&report.traces) {
@@ -244,7 +251,7 @@ fn print_json(context: &Context, report: &Report, sources: &SourceMap) {
     let trace: Vec<String> =
         first_trace(report, true).map_or_else(Vec::new, |(_, trace)| trace.iter().map(ToString::to_string).collect());
     context.out.json(&json!({
-        "ok": report.verdict != Verdict::Refused,
+        "ok": report.verdict != CheckVerdict::Refused,
         "verdict": report.verdict.word(),
         "left": report.left,
         "findings": findings,
@@ -282,7 +289,7 @@ fn bounds(explored: &Explored, deployment: &Deployment, budget: CheckBudget) -> 
 }
 
 /// A line that counts the findings.
-fn count(context: &Context, findings: &[Finding]) {
+fn count(context: &CommandContext, findings: &[Finding]) {
     let of = |severity| findings.iter().filter(|f| f.severity == severity).count();
     let mut parts = Vec::new();
     for (severity, word) in [(Severity::Error, "error"), (Severity::Warning, "warning"), (Severity::Info, "note")] {

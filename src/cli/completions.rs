@@ -1,7 +1,7 @@
 //! `davit completions SHELL`
 
 use super::exit::Exit;
-use super::{Answer, Context, Run};
+use super::{CommandContext, CommandResult, Run};
 
 /// Print a completion script for a shell.
 ///
@@ -14,7 +14,7 @@ pub struct Args {
 }
 
 impl Run for Args {
-    fn run(self, context: &Context) -> Answer {
+    fn run(self, context: &CommandContext) -> CommandResult {
         let mut script = Vec::new();
         clap_complete::generate(self.shell, &mut super::command(), "davit", &mut script);
         context.out.text(String::from_utf8_lossy(&script));

@@ -2,7 +2,7 @@
 
 use super::exit::Exit;
 use super::input::{Parameters, is_deployment};
-use super::{Answer, Context, Failure, Run, write_output};
+use super::{CommandContext, CommandFailure, CommandResult, Run, write_output};
 use crate::diagnostics::Language;
 use crate::lang::{self, LoadOptions, Sources};
 use crate::model::Finding;
@@ -47,7 +47,7 @@ enum To {
 }
 
 impl Run for Args {
-    fn run(self, context: &Context) -> Answer {
+    fn run(self, context: &CommandContext) -> CommandResult {
         let language = match self.to {
             To::Lua => Language::Lua,
             To::Yaml => Language::Yaml,
@@ -57,7 +57,12 @@ impl Run for Args {
             let loaded = lang::load(&self.file, &self.parameters.options()?);
             let Some(deployment) = loaded.deployment else {
                 let exit = if loaded.unreadable { Exit::Usage } else { Exit::No };
-                return Err(Failure { exit, findings: loaded.findings, sources: loaded.sources, ..Failure::default() });
+                return Err(CommandFailure {
+                    exit,
+                    findings: loaded.findings,
+                    sources: loaded.sources,
+                    ..CommandFailure::default()
+                });
             };
             context.out.findings(&loaded.findings, &loaded.sources);
             for (name, file) in lang::print::kept(&deployment) {
@@ -92,11 +97,11 @@ impl Run for Args {
         let converted = lang::convert(&Sources::Disk, &self.file, language, &options);
         let Some(text) = converted.text else {
             let exit = if converted.unreadable { Exit::Usage } else { Exit::No };
-            return Err(Failure {
+            return Err(CommandFailure {
                 exit,
                 findings: converted.findings,
                 sources: converted.sources,
-                ..Failure::default()
+                ..CommandFailure::default()
             });
         };
         context.out.findings(&converted.findings, &converted.sources);

@@ -2,15 +2,15 @@
 
 use super::detach;
 use super::exit::Exit;
-use super::input::Input;
+use super::input::CommandInput;
 use super::keep::Keep;
 use super::last_words;
 use super::output::{Output, Style};
 use super::progress::ProgressView;
 use super::signals::SignalWatch;
-use super::{Answer, Context, Failure, Run};
+use super::{CommandContext, CommandFailure, CommandResult, Run};
 use crate::app::{self, Checked, StartError};
-use crate::model::codes::{CLI_NAME_TAKEN, CLI_SYSTEM, DEPLOY_NO_PLATFORM, FUNCTIONS_NOT_OPENED};
+use crate::model::codes::{CLI_NAME_TAKEN, CLI_SYSTEM, DEPLOY_NO_PLATFORM, FUNCTIONS_NOT_OPENED, TYPE_DIFFERS};
 use crate::model::finding::count;
 use crate::session::kept::Leave;
 use crate::session::place;
@@ -36,7 +36,7 @@ use std::sync::{Arc, Mutex};
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
-    input: Input,
+    input: CommandInput,
     /// Return once it is up, and leave it running in the background.
     #[arg(long)]
     detach: bool,
@@ -77,7 +77,7 @@ impl ClockKind {
 }
 
 impl Run for Args {
-    fn run(self, context: &Context) -> Answer {
+    fn run(self, context: &CommandContext) -> CommandResult {
         if self.detach {
             return detach::run(context).map_err(|failure| failure.in_json(self.json));
         }
@@ -86,7 +86,7 @@ impl Run for Args {
 }
 
 impl Args {
-    fn deploy(&self, context: &Context) -> Answer {
+    fn deploy(&self, context: &CommandContext) -> CommandResult {
         let checked = self.input.check(context)?;
         let clock = self.clock.make(self.pace);
         let progress = ProgressView::new(context.out, self.json, &clock).map_err(short)?;
@@ -98,20 +98,25 @@ impl Args {
 
     fn foreground(
         &self,
-        context: &Context,
+        context: &CommandContext,
         checked: &Checked,
         clock: &Clock,
         progress: &ProgressView,
-    ) -> Result<Exit, Failure> {
+    ) -> Result<Exit, CommandFailure> {
         let _participant = clock.enter();
         let (name, in_background) = (checked.deployment.name, self.in_background);
         let session = app::start(checked, clock).map_err(|error| match error {
-            StartError::Platform { .. } => Failure::no(
+            StartError::Platform { .. } => CommandFailure::no(
                 DEPLOY_NO_PLATFORM,
                 error.to_string(),
                 "the words are the platform's own: look at what it needs, and at its options under `platform`",
             ),
-            StartError::Functions { why } => Failure::no(
+            StartError::Types { .. } => CommandFailure::no(
+                TYPE_DIFFERS,
+                error.to_string(),
+                "declare the types as the platform has them, or give it what the deployment was written for",
+            ),
+            StartError::Functions { why } => CommandFailure::no(
                 FUNCTIONS_NOT_OPENED,
                 format!("the coordinator's functions cannot be run: {why}"),
                 "the text ran when it was read: does it depend on time or chance?",
@@ -170,16 +175,16 @@ impl Args {
     }
 }
 
-pub(super) fn open(session: &Arc<Session>) -> Result<ControlSocket, Failure> {
+pub(super) fn open(session: &Arc<Session>) -> Result<ControlSocket, CommandFailure> {
     let name = session.deployment().name;
     let service = Arc::new(SessionService::new(Arc::downgrade(session)));
     ControlSocket::open(name.as_str(), service).map_err(|error| match error {
-        SocketError::Taken(name) => Failure::no(
+        SocketError::Taken(name) => CommandFailure::no(
             CLI_NAME_TAKEN,
             format!("a deployment named `{name}` is already running"),
             format!("`davit shutdown {name}` takes it down; or give this one another `name`"),
         ),
-        SocketError::Io { path, .. } if path.as_os_str().len() > place::LONGEST => Failure::usage(
+        SocketError::Io { path, .. } if path.as_os_str().len() > place::LONGEST => CommandFailure::usage(
             CLI_SYSTEM,
             format!(
                 "the path of the control socket has {} bytes, and may have {}: {}",
@@ -189,7 +194,7 @@ pub(super) fn open(session: &Arc<Session>) -> Result<ControlSocket, Failure> {
             ),
             "give the deployment a shorter `name`, or set XDG_RUNTIME_DIR to a directory with a shorter path",
         ),
-        SocketError::Io { path, source } => Failure::usage(
+        SocketError::Io { path, source } => CommandFailure::usage(
             CLI_SYSTEM,
             format!("cannot listen on {}: {source}", path.display()),
             "set XDG_RUNTIME_DIR to a directory of yours that can be written",
@@ -205,7 +210,7 @@ fn watch(
     progress: &ProgressView,
     leaving: &Leaving,
     in_background: bool,
-) -> Result<SignalWatch, Failure> {
+) -> Result<SignalWatch, CommandFailure> {
     let stop = {
         let (session, progress) = (Arc::downgrade(session), progress.clone());
         move |force| {
@@ -228,8 +233,8 @@ fn watch(
 }
 
 /// Signals cannot be watched.
-pub(super) fn unwatched(error: std::io::Error) -> Failure {
-    Failure::usage(
+pub(super) fn unwatched(error: std::io::Error) -> CommandFailure {
+    CommandFailure::usage(
         CLI_SYSTEM,
         format!("signals cannot be watched: {error}"),
         "try again; the system is short of threads",
@@ -237,8 +242,8 @@ pub(super) fn unwatched(error: std::io::Error) -> Failure {
 }
 
 /// The system has no thread left.
-pub(super) fn short(error: std::io::Error) -> Failure {
-    Failure::usage(
+pub(super) fn short(error: std::io::Error) -> CommandFailure {
+    CommandFailure::usage(
         CLI_SYSTEM,
         format!("no thread can be started: {error}"),
         "try again; the system is short of threads",

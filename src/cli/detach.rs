@@ -7,7 +7,7 @@ use super::exit::Exit;
 use super::last_words;
 use super::output::{self, Output};
 use super::signals::SignalWatch;
-use super::{Answer, Context, Failure};
+use super::{CommandContext, CommandFailure, CommandResult};
 use crate::model::codes::CLI_SYSTEM;
 use crate::time::lock;
 use std::io::{BufRead, BufReader};
@@ -30,9 +30,9 @@ pub fn tell_up(out: Output) {
 }
 
 /// Starts the process in the background, passes its words on until it is up, and returns.
-pub fn run(context: &Context) -> Answer {
+pub fn run(context: &CommandContext) -> CommandResult {
     let failed = |what: &str, error: &std::io::Error| {
-        Failure::usage(CLI_SYSTEM, format!("{what}: {error}"), "deploy without `--detach`, or try again")
+        CommandFailure::usage(CLI_SYSTEM, format!("{what}: {error}"), "deploy without `--detach`, or try again")
     };
     let program = std::env::current_exe().map_err(|e| failed("the program's own file is not known", &e))?;
     let arguments = std::env::args_os().skip(1).filter(|a| a != "--detach");

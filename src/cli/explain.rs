@@ -2,8 +2,8 @@
 
 use super::exit::Exit;
 use super::output::{Output, Style, Table, text_columns, wrapped};
-use super::{Answer, Context, Failure, Run};
-use crate::lang::schema::{self, Entry};
+use super::{CommandContext, CommandFailure, CommandResult, Run};
+use crate::lang::schema::{self, ReferenceEntry};
 use crate::model::codes::{self, CLI_UNKNOWN_CODE, PAGES, Page};
 use crate::model::finding::did_you_mean;
 use serde::Serialize;
@@ -39,7 +39,7 @@ impl From<&'static Page> for CodeView {
 }
 
 impl Run for Args {
-    fn run(self, context: &Context) -> Answer {
+    fn run(self, context: &CommandContext) -> CommandResult {
         let out = &context.out;
         match (self.what, self.keys) {
             (Some(what), _) => one(out, &what, self.json)?,
@@ -62,7 +62,7 @@ fn all(out: &Output, json: bool) {
 }
 
 fn keys(out: &Output, json: bool) {
-    let entries: Vec<Entry> = schema::names().into_iter().flat_map(schema::about).collect();
+    let entries: Vec<ReferenceEntry> = schema::names().into_iter().flat_map(schema::about).collect();
     if json {
         return out.json(&entries);
     }
@@ -74,7 +74,7 @@ fn keys(out: &Output, json: bool) {
 }
 
 /// What it is called where its name alone may mean several: `configuration.timeout`.
-fn path(entry: &Entry) -> String {
+fn path(entry: &ReferenceEntry) -> String {
     entry.of.map_or_else(|| entry.name.to_owned(), |of| format!("{of}.{}", entry.name))
 }
 
@@ -83,7 +83,7 @@ fn first_sentence(text: &str) -> &str {
 }
 
 /// A code, else what can be written under that name.
-fn one(out: &Output, what: &str, json: bool) -> Result<(), Failure> {
+fn one(out: &Output, what: &str, json: bool) -> Result<(), CommandFailure> {
     if let Some(page) = codes::page(what) {
         if json {
             out.json(&CodeView::from(page));
@@ -110,7 +110,7 @@ fn one(out: &Output, what: &str, json: bool) -> Result<(), Failure> {
     Ok(())
 }
 
-fn unknown(what: &str) -> Failure {
+fn unknown(what: &str) -> CommandFailure {
     let name = what.strip_prefix("davit::").unwrap_or(what);
     let (message, list) = match what.contains("::") {
         true => (format!("there is no finding with the code `{what}`"), "`davit explain` lists all codes"),
@@ -120,11 +120,11 @@ fn unknown(what: &str) -> Failure {
         ),
     };
     let known = PAGES.iter().map(|page| page.code.0).chain(schema::names());
-    Failure::no(CLI_UNKNOWN_CODE, message, format!("{}; {list}", did_you_mean(name, "codes and keys", known)))
+    CommandFailure::no(CLI_UNKNOWN_CODE, message, format!("{}; {list}", did_you_mean(name, "codes and keys", known)))
 }
 
 /// What a key, a table or a word is, for people.
-fn shown(out: &Output, entry: &Entry) -> String {
+fn shown(out: &Output, entry: &ReferenceEntry) -> String {
     let mut text = format!("{}{}\n", out.paint(Style::Name, path(entry)), entry.demanded());
     text.push_str(&wrapped(entry.doc, text_columns(), 2));
     let mut line = |name: &str, value: &str| {

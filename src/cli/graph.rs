@@ -1,9 +1,9 @@
 //! `davit graph`
 
 use super::exit::Exit;
-use super::input::{Coordinator, Input, Parameters, coordinators, is_deployment, which};
+use super::input::{CommandInput, CoordinatorInput, Parameters, coordinators, is_deployment, which};
 use super::remote::{ASK, ask};
-use super::{Answer, Context, Failure, Run, write_output};
+use super::{CommandContext, CommandFailure, CommandResult, Run, write_output};
 use crate::app::{drive, plan, plan_way, wrong_in_others};
 use crate::check::Until;
 use crate::diagnostics::Language;
@@ -11,7 +11,7 @@ use crate::draw;
 use crate::lang;
 use crate::model::Findings;
 use crate::model::codes::CLI_FORMAT_OF_COORDINATORS;
-use crate::model::program::Beside;
+use crate::model::program::AuxiliaryFunction;
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -77,7 +77,7 @@ enum Format {
 }
 
 impl Run for Args {
-    fn run(self, context: &Context) -> Answer {
+    fn run(self, context: &CommandContext) -> CommandResult {
         let what = if is_deployment(&self.file) { self.what } else { Drawn::Coordinator };
         let picture = if what == Drawn::Coordinator {
             let mut all = coordinators(&self.file, &self.parameters, self.of.as_deref(), &[])?;
@@ -104,8 +104,10 @@ impl Run for Args {
             write_output(context, self.output.as_deref(), &text)?;
             return Ok(Exit::Done);
         } else {
-            let read = Input { file: self.file.clone(), parameters: self.parameters.clone() }.read_but_for(context)?;
-            let refused = |findings| Failure { findings, sources: read.sources.clone(), ..Failure::default() };
+            let read =
+                CommandInput { file: self.file.clone(), parameters: self.parameters.clone() }.read_but_for(context)?;
+            let refused =
+                |findings| CommandFailure { findings, sources: read.sources.clone(), ..CommandFailure::default() };
             let name = read.deployment.name;
             // What is wrong with configurations that are not drawn refuses nothing.
             let tell_others = |told: Option<&Findings>| {
@@ -155,14 +157,14 @@ impl Run for Args {
 const UNVERIFIED: &str = " (functions are not verified)";
 
 /// Whether functions beside a chart without any are asked for something.
-fn asks_beside(read: &Coordinator) -> bool {
-    let asks = |beside: &Beside| beside.plugin.as_deref() != Some("checkevents");
+fn asks_beside(read: &CoordinatorInput) -> bool {
+    let asks = |beside: &AuxiliaryFunction| beside.plugin.as_deref() != Some("checkevents");
     read.chart.is_pure() && read.program.iter().any(|program| program.beside.iter().any(asks))
 }
 
 impl Args {
     /// All coordinators of a deployment in one picture.
-    fn several(&self, context: &Context, all: &[Coordinator]) -> Answer {
+    fn several(&self, context: &CommandContext, all: &[CoordinatorInput]) -> CommandResult {
         if matches!(self.format, Format::Plantuml | Format::Json | Format::Scxml) {
             // These languages write one statechart.
             return Err(which(all.iter()));
@@ -183,13 +185,13 @@ impl Args {
         self.write(context, &draw::coordinators(&format!("{name}: coordinators"), &charts))
     }
 
-    fn write(&self, context: &Context, picture: &draw::Picture) -> Answer {
+    fn write(&self, context: &CommandContext, picture: &draw::Diagram) -> CommandResult {
         let text = match self.format {
             Format::Svg => picture.svg(),
             Format::Dot => picture.dot(),
             Format::Mermaid => picture.mermaid(),
             Format::Plantuml | Format::Scxml | Format::Json => {
-                return Err(Failure::usage(
+                return Err(CommandFailure::usage(
                     CLI_FORMAT_OF_COORDINATORS,
                     "only a coordinator can be written in this format",
                     "add `--what coordinator`, or ask for `svg`, `dot` or `mermaid`",
@@ -201,7 +203,7 @@ impl Args {
     }
 
     /// The active states of the coordinator in the running deployment.
-    fn active(&self, read: &Coordinator) -> Result<Vec<String>, Failure> {
+    fn active(&self, read: &CoordinatorInput) -> Result<Vec<String>, CommandFailure> {
         let name = self.on.as_deref().or(read.deployment.as_deref());
         let status = ask(name, "status", &json!({}), ASK)?;
         let states = match &read.of {

@@ -2,7 +2,7 @@
 //! from its work.
 
 use super::exit::Exit;
-use super::{Context, Failure};
+use super::{CommandContext, CommandFailure};
 use crate::app::{self, Checked, Read, Refused};
 use crate::diagnostics::SourceMap;
 use crate::lang::{self, LoadOptions, Sources};
@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 /// The file a command works on, and its parameters.
 #[derive(Debug, Clone, clap::Args)]
-pub struct Input {
+pub struct CommandInput {
     /// The deployment file.
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
@@ -36,11 +36,11 @@ impl Parameters {
     ///
     /// # Errors
     /// When one is not of the form `NAME=VALUE`.
-    pub fn options(&self) -> Result<LoadOptions, Failure> {
+    pub fn options(&self) -> Result<LoadOptions, CommandFailure> {
         let mut set = Vec::new();
         for text in &self.set {
             let Some((name, value)) = text.split_once('=').filter(|(name, _)| !name.trim().is_empty()) else {
-                return Err(Failure::usage(
+                return Err(CommandFailure::usage(
                     CLI_BAD_SET,
                     format!("`--set {text}` gives no parameter a value"),
                     "write `--set NAME=VALUE`, such as `--set gains.k=2.5`",
@@ -52,12 +52,12 @@ impl Parameters {
     }
 }
 
-impl Input {
+impl CommandInput {
     /// Reads the deployment.
     ///
     /// # Errors
     /// What is wrong with its texts, or a library that this program does not have.
-    pub fn read(&self, context: &Context) -> Result<Read, Failure> {
+    pub fn read(&self, context: &CommandContext) -> Result<Read, CommandFailure> {
         Ok(app::read(&self.file, &self.parameters.options()?, &context.extensions)?)
     }
 
@@ -65,7 +65,7 @@ impl Input {
     ///
     /// # Errors
     /// What else is wrong with its texts, or a library that this program does not have.
-    pub fn read_but_for(&self, context: &Context) -> Result<Read, Failure> {
+    pub fn read_but_for(&self, context: &CommandContext) -> Result<Read, CommandFailure> {
         Ok(app::read_but_for(&self.file, &self.parameters.options()?, &context.extensions)?)
     }
 
@@ -73,12 +73,12 @@ impl Input {
     ///
     /// # Errors
     /// What reading or checking found.
-    pub fn check(&self, context: &Context) -> Result<Checked, Failure> {
+    pub fn check(&self, context: &CommandContext) -> Result<Checked, CommandFailure> {
         Ok(app::check(self.read(context)?)?)
     }
 }
 
-impl From<Refused> for Failure {
+impl From<Refused> for CommandFailure {
     fn from(refused: Refused) -> Self {
         let exit = if refused.unreadable { Exit::Usage } else { Exit::No };
         Self { exit, findings: refused.findings, sources: refused.sources, ..Self::default() }
@@ -87,7 +87,7 @@ impl From<Refused> for Failure {
 
 /// A coordinator read from its own file, or from a deployment that names it.
 #[derive(Debug)]
-pub struct Coordinator {
+pub struct CoordinatorInput {
     /// A name to show: the file's without its ending.
     pub name: String,
     /// The deployment that names it, if it was read from one.
@@ -114,7 +114,7 @@ pub fn coordinator(
     parameters: &Parameters,
     of: Option<&str>,
     host: &[PathBuf],
-) -> Result<Coordinator, Failure> {
+) -> Result<CoordinatorInput, CommandFailure> {
     let mut all = coordinators(path, parameters, of, host)?;
     match (all.pop(), all.is_empty()) {
         (Some(only), true) => Ok(only),
@@ -123,9 +123,9 @@ pub fn coordinator(
 }
 
 /// That it is to be said which of several coordinators is meant.
-pub fn which<'a>(all: impl Iterator<Item = &'a Coordinator>) -> Failure {
+pub fn which<'a>(all: impl Iterator<Item = &'a CoordinatorInput>) -> CommandFailure {
     let names: Vec<&str> = all.filter_map(|one| one.of.as_deref()).collect();
-    Failure::usage(
+    CommandFailure::usage(
         CLI_WHICH_COORDINATOR,
         format!("the deployment has {} coordinators", names.len()),
         format!("say which one: `--of NAME`, with one of {}", names.join(", ")),
@@ -141,7 +141,7 @@ pub fn coordinators(
     parameters: &Parameters,
     of: Option<&str>,
     host: &[PathBuf],
-) -> Result<Vec<Coordinator>, Failure> {
+) -> Result<Vec<CoordinatorInput>, CommandFailure> {
     let options = LoadOptions { trusted: true, host: host.to_vec(), ..parameters.options()? };
     let name = path.file_stem().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
     if is_deployment(path) {
@@ -153,11 +153,11 @@ pub fn coordinators(
         let known: Vec<Ident> = d.coordinators.iter().map(|own| own.name).collect();
         if let Some(of) = of.filter(|of| known.iter().all(|name| name.as_str() != *of)) {
             let help = did_you_mean(of, "coordinators", known.iter().map(Ident::as_str));
-            return Err(Failure::usage(CLI_WHICH_COORDINATOR, format!("there is no coordinator `{of}`"), help));
+            return Err(CommandFailure::usage(CLI_WHICH_COORDINATOR, format!("there is no coordinator `{of}`"), help));
         }
         let wanted = |own: &crate::model::Coordinator| of.is_none_or(|of| own.name.as_str() == of);
         let mut programs = d.programs;
-        let one = |own: crate::model::Coordinator| Coordinator {
+        let one = |own: crate::model::Coordinator| CoordinatorInput {
             name: name.clone(),
             deployment: Some(named.clone()),
             of: Some(own.name.to_string()),
@@ -173,15 +173,15 @@ pub fn coordinators(
         Some(chart) => {
             let (program, sources, findings) = (loaded.program, loaded.sources, loaded.findings);
             let of = of.map(str::to_owned);
-            Ok(vec![Coordinator { name, deployment: None, of, chart, program, sources, findings }])
+            Ok(vec![CoordinatorInput { name, deployment: None, of, chart, program, sources, findings }])
         }
         None => Err(unread(loaded.findings, loaded.sources, loaded.unreadable)),
     }
 }
 
-fn unread(findings: Findings, sources: SourceMap, unreadable: bool) -> Failure {
+fn unread(findings: Findings, sources: SourceMap, unreadable: bool) -> CommandFailure {
     let exit = if unreadable { Exit::Usage } else { Exit::No };
-    Failure { exit, findings, sources, ..Failure::default() }
+    CommandFailure { exit, findings, sources, ..CommandFailure::default() }
 }
 
 /// Whether a file is a deployment: YAML with the key `davit` at the beginning of a line.

@@ -1,6 +1,6 @@
 //! What `davit deploy` keeps on disk of the deployment that it runs.
 
-use super::Failure;
+use super::CommandFailure;
 use super::deploy::short;
 use super::last_words;
 use super::output;
@@ -23,7 +23,12 @@ impl Keep {
     ///
     /// # Errors
     /// When what is printed in the background cannot be caught: then it would have nowhere to go.
-    pub fn begin(session: &Arc<Session>, file: &Path, clock: &Clock, in_background: bool) -> Result<Self, Failure> {
+    pub fn begin(
+        session: &Arc<Session>,
+        file: &Path,
+        clock: &Clock,
+        in_background: bool,
+    ) -> Result<Self, CommandFailure> {
         let keeper = Keeper::open(session.deployment().name.as_str(), file, clock).map_err(|why| {
             let text = format!("note: what happens is not kept for `davit log` after the end: {why}\n");
             last_words::say(move || output::error(&text));

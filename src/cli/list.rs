@@ -5,7 +5,7 @@ use super::kept::{self, Died};
 use super::output::{Output, Style, Table};
 use super::remote::ASK;
 use super::status::{state_style, text};
-use super::{Answer, Context, Failure, Run};
+use super::{CommandContext, CommandFailure, CommandResult, Run};
 use crate::model::codes::{CLI_NOTHING_KEPT, CLI_SYSTEM};
 use crate::model::finding::count;
 use crate::session::client::Client;
@@ -28,10 +28,10 @@ pub struct Args {
 }
 
 impl Run for Args {
-    fn run(self, context: &Context) -> Answer {
+    fn run(self, context: &CommandContext) -> CommandResult {
         if let Some(name) = self.forget {
             return if owner::is_owned(&name) || life(&name).is_some_and(|life| life.alive) {
-                Err(Failure::no(
+                Err(CommandFailure::no(
                     CLI_NOTHING_KEPT,
                     format!("`{name}` runs, and nothing of it is forgotten before it has ended"),
                     format!("`davit shutdown {name}` takes it down; what is kept of it is then that it was shut down"),
@@ -39,12 +39,12 @@ impl Run for Args {
             } else {
                 match forget(&name) {
                     Ok(true) => Ok(Exit::Done),
-                    Ok(false) => Err(Failure::no(
+                    Ok(false) => Err(CommandFailure::no(
                         CLI_NOTHING_KEPT,
                         format!("nothing of a deployment `{name}` that does not run any more is kept"),
                         "`davit list` shows what runs, and what died",
                     )),
-                    Err((path, why)) => Err(Failure::usage(
+                    Err((path, why)) => Err(CommandFailure::usage(
                         CLI_SYSTEM,
                         format!("{} cannot be thrown away: {why}", path.display()),
                         "look what it is, and remove it by hand",

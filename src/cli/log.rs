@@ -5,7 +5,7 @@ use super::kept;
 use super::output::{Output, Style};
 use super::remote::{ASK, ask, failure};
 use super::status::text;
-use super::{Answer, Context, Failure, Run, output};
+use super::{CommandContext, CommandFailure, CommandResult, Run, output};
 use crate::model::codes::{CLI_NO_ANSWER, CLI_NOT_RUNNING};
 use crate::model::finding::count;
 use crate::session::Stage;
@@ -36,14 +36,14 @@ pub struct Args {
 }
 
 impl Run for Args {
-    fn run(self, context: &Context) -> Answer {
+    fn run(self, context: &CommandContext) -> CommandResult {
         let json = self.json;
         self.show(context).map_err(|failure| failure.in_json(json))
     }
 }
 
 impl Args {
-    fn show(self, context: &Context) -> Answer {
+    fn show(self, context: &CommandContext) -> CommandResult {
         if self.follow {
             return self.follow(context);
         }
@@ -64,10 +64,10 @@ impl Args {
     }
 
     /// What was kept of one that could not be asked since it does not run any more.
-    fn kept(&self, context: &Context, error: ClientError) -> Result<Json, Failure> {
+    fn kept(&self, context: &CommandContext, error: ClientError) -> Result<Json, CommandFailure> {
         let life = kept::meant(&error).ok_or_else(|| failure(error))?;
         let mut entries = entries(&life.name).map_err(|why| {
-            Failure::no(
+            CommandFailure::no(
                 CLI_NOT_RUNNING,
                 format!("`{}` does not run, and its log cannot be read: {why}", life.name),
                 "`davit list` shows what runs",
@@ -86,14 +86,14 @@ impl Args {
         self.follow
     }
 
-    fn print(&self, context: &Context, entry: &Json) {
+    fn print(&self, context: &CommandContext, entry: &Json) {
         match self.json {
             true => context.out.json_line(entry),
             false => context.out.text(line(&context.out, entry, self.steps)),
         }
     }
 
-    fn follow(&self, context: &Context) -> Answer {
+    fn follow(&self, context: &CommandContext) -> CommandResult {
         let mut client = match Client::connect(self.name.as_deref()) {
             Ok(client) => client,
             Err(error) => {
@@ -124,7 +124,7 @@ impl Args {
             return Ok(kept::EXIT);
         }
         if !phases.over && owner::is_owned(&name) {
-            return Err(Failure::no(
+            return Err(CommandFailure::no(
                 CLI_NO_ANSWER,
                 format!("the deployment `{name}` ended the connection"),
                 "more happened than could be printed, or it is going down: `davit log` shows what it remembers",

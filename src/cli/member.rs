@@ -5,7 +5,7 @@ use super::output::Style;
 use super::remote::{Patience, WITHIN, WaitFor, Which, connect, failure, seconds};
 use super::request::request;
 use super::status::text;
-use super::{Answer, Context, Run};
+use super::{CommandContext, CommandResult, Run};
 use serde_json::{Value as Json, json};
 
 /// Show what a property or a port of a running deployment is worth: value, unit, and when that was.
@@ -28,7 +28,7 @@ pub struct GetArgs {
 }
 
 impl Run for GetArgs {
-    fn run(self, context: &Context) -> Answer {
+    fn run(self, context: &CommandContext) -> CommandResult {
         let out = &context.out;
         let params = json!({ "name": self.member, "within_s": self.within });
         let patience = Patience::within(self.within);
@@ -85,7 +85,7 @@ pub struct SetArgs {
 }
 
 impl Run for SetArgs {
-    fn run(self, context: &Context) -> Answer {
+    fn run(self, context: &CommandContext) -> CommandResult {
         let patience = Patience::within(self.wait.within);
         let ask = || {
             let mut client = connect(self.which.name.as_deref())?;

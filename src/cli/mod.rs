@@ -79,7 +79,7 @@ macro_rules! commands {
         }
 
         impl Command {
-            fn run(self, context: &Context) -> Answer {
+            fn run(self, context: &CommandContext) -> CommandResult {
                 match self {
                     $(Self::$variant(args) => args.run(context),)*
                 }
@@ -119,7 +119,7 @@ commands! {
 
 /// What every command may use.
 #[derive(Debug)]
-pub struct Context {
+pub struct CommandContext {
     /// Its streams.
     pub out: Output,
     /// The component libraries and platforms of this program.
@@ -131,16 +131,16 @@ pub trait Run {
     /// Does it, and says how it ended.
     ///
     /// # Errors
-    /// [`Failure`] when there are findings instead of an answer.
-    fn run(self, context: &Context) -> Answer;
+    /// [`CommandFailure`] when there are findings instead of an answer.
+    fn run(self, context: &CommandContext) -> CommandResult;
 }
 
 /// How a command ended, or what kept it from its work.
-pub type Answer = Result<Exit, Failure>;
+pub type CommandResult = Result<Exit, CommandFailure>;
 
 /// Findings that end a command, and its exit code.
 #[derive(Debug)]
-pub struct Failure {
+pub struct CommandFailure {
     /// How it ended.
     pub exit: Exit,
     /// Why.
@@ -151,13 +151,13 @@ pub struct Failure {
     pub json: bool,
 }
 
-impl Default for Failure {
+impl Default for CommandFailure {
     fn default() -> Self {
         Self { exit: Exit::No, findings: Vec::new(), sources: SourceMap::new(), json: false }
     }
 }
 
-impl Failure {
+impl CommandFailure {
     /// One error; the answer is no.
     pub fn no(code: Code, message: impl Into<String>, help: impl Into<String>) -> Self {
         Self { findings: vec![Finding::error(code, message).help(help)], ..Self::default() }
@@ -189,13 +189,13 @@ impl Failure {
 ///
 /// # Errors
 /// When the file cannot be written.
-pub fn write_output(context: &Context, file: Option<&Path>, text: &str) -> Result<(), Failure> {
+pub fn write_output(context: &CommandContext, file: Option<&Path>, text: &str) -> Result<(), CommandFailure> {
     let Some(file) = file else {
         context.out.text(text);
         return Ok(());
     };
     std::fs::write(file, text).map_err(|error| {
-        Failure::usage(
+        CommandFailure::usage(
             CLI_UNWRITABLE,
             format!("{}: {error}", file.display()),
             "name a file in a directory that exists and may be written, or leave `-o` out to print",
@@ -226,7 +226,7 @@ fn run(extensions: Extensions) -> ExitCode {
             return written(Output::new(Color::Auto), if error.use_stderr() { Exit::Usage } else { Exit::Done }).into();
         }
     };
-    let context = Context { out: Output::new(cli.color), extensions };
+    let context = CommandContext { out: Output::new(cli.color), extensions };
     // They keep a robot up: nothing that cannot be written may hold them.
     if matches!(cli.command, Command::Deploy(_) | Command::Run(_))
         && let Err(error) = last_words::prepare()
@@ -256,8 +256,8 @@ fn run(extensions: Extensions) -> ExitCode {
 }
 
 /// Prints why a command did not do its work; answers how it ended.
-fn tell(out: Output, failure: Failure, streams: bool) -> Exit {
-    let Failure { exit, findings, sources, json } = failure;
+fn tell(out: Output, failure: CommandFailure, streams: bool) -> Exit {
+    let CommandFailure { exit, findings, sources, json } = failure;
     last_words::say(move || {
         if json {
             let answer = serde_json::json!({ "ok": false, "findings": to_json(&findings, &sources) });
@@ -272,7 +272,7 @@ fn tell(out: Output, failure: Failure, streams: bool) -> Exit {
 /// How a command ended that has written what it had to say: no good end if it could not.
 fn written(out: Output, exit: Exit) -> Exit {
     let Some(why) = output::unwritten() else { return exit };
-    let failure = Failure::usage(
+    let failure = CommandFailure::usage(
         CLI_UNWRITABLE,
         format!("the output could not be written: {why}"),
         "make room where the output goes, or send it elsewhere",

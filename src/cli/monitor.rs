@@ -1,9 +1,9 @@
 //! `davit monitor`
 
 use super::exit::Exit;
-use super::input::{Input, Parameters, is_deployment};
+use super::input::{CommandInput, Parameters, is_deployment};
 use super::output::{self, Style, Table};
-use super::{Answer, Context, Failure, Run};
+use super::{CommandContext, CommandFailure, CommandResult, Run};
 use crate::check;
 use crate::diagnostics::{SourceMap, to_json};
 use crate::lang::{self, Sources};
@@ -14,7 +14,7 @@ use crate::model::codes::{
 };
 use crate::model::finding::{did_you_mean, has_errors};
 use crate::model::{Finding, Findings, Monitor, Origin};
-use crate::monitor::replay::{Raised, Replay, Tally};
+use crate::monitor::replay::{MonitorEvent, Replay, Tally};
 use crate::monitor::table::{Columns, TableProblem, decimal, empty, is_blank};
 use crate::time::Time;
 use serde_json::{Value, json};
@@ -54,7 +54,7 @@ pub struct Args {
 }
 
 impl Run for Args {
-    fn run(self, context: &Context) -> Answer {
+    fn run(self, context: &CommandContext) -> CommandResult {
         let json = self.json;
         self.replay(context).map_err(|failure| failure.in_json(json))
     }
@@ -68,9 +68,9 @@ struct Found {
 }
 
 impl Args {
-    fn monitors(&self, context: &Context) -> Result<Found, Failure> {
+    fn monitors(&self, context: &CommandContext) -> Result<Found, CommandFailure> {
         let (monitors, findings, sources) = if is_deployment(&self.file) {
-            let input = Input { file: self.file.clone(), parameters: self.parameters.clone() };
+            let input = CommandInput { file: self.file.clone(), parameters: self.parameters.clone() };
             let read = input.read_but_for(context)?;
             // What a configuration's text lacks may be what a monitor watches.
             let wrong = check::monitors(&read.deployment, &read.catalogue, !has_errors(&read.findings));
@@ -80,7 +80,12 @@ impl Args {
             let loaded = lang::load_monitors(&Sources::Disk, &self.file, &self.parameters.options()?);
             if has_errors(&loaded.findings) {
                 let exit = if loaded.unreadable { Exit::Usage } else { Exit::No };
-                return Err(Failure { exit, findings: loaded.findings, sources: loaded.sources, ..Failure::default() });
+                return Err(CommandFailure {
+                    exit,
+                    findings: loaded.findings,
+                    sources: loaded.sources,
+                    ..CommandFailure::default()
+                });
             }
             (loaded.monitors, loaded.findings, loaded.sources)
         };
@@ -89,7 +94,7 @@ impl Args {
             let Some(monitor) = monitors.iter().find(|m| m.name.as_str() == name) else {
                 let known = monitors.iter().map(|m| m.name.as_str());
                 let message = format!("there is no monitor `{name}` in {}", self.file.display());
-                return Err(Failure::no(CLI_UNKNOWN_MONITOR, message, did_you_mean(name, "monitors", known)));
+                return Err(CommandFailure::no(CLI_UNKNOWN_MONITOR, message, did_you_mean(name, "monitors", known)));
             };
             chosen.push(Monitor { enabled: true, ..monitor.clone() });
         }
@@ -99,7 +104,7 @@ impl Args {
         Ok(Found { monitors: chosen, findings, sources })
     }
 
-    fn renamed(&self) -> Result<Vec<(String, String)>, Failure> {
+    fn renamed(&self) -> Result<Vec<(String, String)>, CommandFailure> {
         let one = |text: &String| match text.split_once('=') {
             Some((signal, column)) if !signal.is_empty() && !column.is_empty() => {
                 Ok((signal.trim().to_owned(), column.trim().to_owned()))
@@ -107,19 +112,19 @@ impl Args {
             _ => {
                 let message = format!("`--column {text}` names no signal and its column");
                 let help = "write `--column SIGNAL=COLUMN`, such as `--column Dynamics.f_raw_norm=u1`";
-                Err(Failure::usage(SAMPLES_COLUMNS, message, help))
+                Err(CommandFailure::usage(SAMPLES_COLUMNS, message, help))
             }
         };
         self.columns.iter().map(one).collect()
     }
 
-    fn replay(self, context: &Context) -> Answer {
+    fn replay(self, context: &CommandContext) -> CommandResult {
         let renamed = self.renamed()?;
         let Found { monitors, mut findings, mut sources } = self.monitors(context)?;
         let name = self.samples.display().to_string();
         let unreadable = |error: &dyn std::fmt::Display| {
             let help = "name a text of comma-separated values, the first line with `time` and the signals";
-            Failure::usage(SAMPLES_UNREADABLE, format!("{name}: {error}"), help)
+            CommandFailure::usage(SAMPLES_UNREADABLE, format!("{name}: {error}"), help)
         };
         let input: Box<dyn Read> = if self.samples.as_os_str() == "-" {
             Box::new(std::io::stdin())
@@ -135,7 +140,8 @@ impl Args {
             let origin = sources.exact(file, 1, problem.column, problem.length);
             Finding::error(problem.code, problem.message).at(origin).help(problem.help)
         };
-        let refused = |findings: Findings, sources: SourceMap| Failure { findings, sources, ..Failure::default() };
+        let refused =
+            |findings: Findings, sources: SourceMap| CommandFailure { findings, sources, ..CommandFailure::default() };
         if !lines.next().map_err(|error| unreadable(&error))? || is_blank(&lines.text) {
             findings.push(wrong(&mut sources, &lines, empty(false)));
             return Err(refused(findings, sources));
@@ -178,7 +184,7 @@ impl Args {
         if !missing.is_empty() || findings.iter().any(|f| f.code == SAMPLES_RENAMED) {
             return Err(refused(findings, sources));
         }
-        let mut raised = |raised: Raised| self.event(context, &monitors, raised);
+        let mut raised = |raised: MonitorEvent| self.event(context, &monitors, raised);
         let mut problem = None;
         // An input may have no end.
         while !output::arrives_nowhere() && lines.next().map_err(|error| unreadable(&error))? {
@@ -205,7 +211,7 @@ impl Args {
         Ok(if ok { Exit::Done } else { Exit::No })
     }
 
-    fn event(&self, context: &Context, monitors: &[Monitor], raised: Raised) {
+    fn event(&self, context: &CommandContext, monitors: &[Monitor], raised: MonitorEvent) {
         let monitor = &monitors[raised.monitor];
         if self.json {
             context.out.json_line(&json!({
@@ -225,7 +231,7 @@ impl Args {
         ));
     }
 
-    fn table(&self, context: &Context, monitors: &[Monitor], replay: &Replay) {
+    fn table(&self, context: &CommandContext, monitors: &[Monitor], replay: &Replay) {
         let out = &context.out;
         let mut table = Table::new(0);
         let heads = ["monitor", "became true", "true for", "least robustness", "greatest"];

@@ -1,10 +1,10 @@
 //! `davit plan`
 
 use super::exit::Exit;
-use super::input::Input;
+use super::input::CommandInput;
 use super::output::{Output, Style, Table};
 use super::plan_view::{PlanView, SystemSteps};
-use super::{Answer, Context, Failure, Run};
+use super::{CommandContext, CommandFailure, CommandResult, Run};
 use crate::app::{Application, plan, plan_way, wrong_in_others};
 use crate::check::Until;
 use crate::model::finding::count;
@@ -18,7 +18,7 @@ use crate::system::Reversibility;
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(flatten)]
-    input: Input,
+    input: CommandInput,
     /// Configurations, in the order to be applied.
     #[arg(value_name = "ID")]
     ids: Vec<String>,
@@ -34,14 +34,14 @@ pub struct Args {
 }
 
 impl Run for Args {
-    fn run(self, context: &Context) -> Answer {
+    fn run(self, context: &CommandContext) -> CommandResult {
         let json = self.json;
         self.show(context).map_err(|failure| failure.in_json(json))
     }
 }
 
 impl Args {
-    fn show(self, context: &Context) -> Answer {
+    fn show(self, context: &CommandContext) -> CommandResult {
         let read = self.input.read_but_for(context)?;
         let planned = if self.ids.is_empty() {
             plan_way(&read, if self.shutdown { Until::Down } else { Until::Up })
@@ -50,8 +50,11 @@ impl Args {
         };
         let told = planned.as_ref().err().map_or(&[][..], Vec::as_slice);
         context.out.findings(&wrong_in_others(&read, told), &read.sources);
-        let planned =
-            planned.map_err(|findings| Failure { findings, sources: read.sources.clone(), ..Failure::default() })?;
+        let planned = planned.map_err(|findings| CommandFailure {
+            findings,
+            sources: read.sources.clone(),
+            ..CommandFailure::default()
+        })?;
         if self.json {
             context.out.json(&planned.iter().map(PlanView::new).collect::<Vec<_>>());
         } else {

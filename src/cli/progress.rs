@@ -9,7 +9,7 @@ use super::output::{Output, Style};
 use crate::limits;
 use crate::model::finding::count;
 use crate::session::log::LogEntry;
-use crate::session::tap::{Hears, News, Tap};
+use crate::session::tap::{LogSink, News, Tap};
 use crate::session::{Happening, Phase};
 use crate::time::Clock;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -58,7 +58,7 @@ impl ProgressView {
     }
 
     /// What to give to the session.
-    pub fn observer(&self) -> Arc<dyn Hears> {
+    pub fn observer(&self) -> Arc<dyn LogSink> {
         Arc::new(self.tap.clone())
     }
 

@@ -5,7 +5,7 @@ use super::exit::Exit;
 use super::output::Style;
 use super::remote::{Patience, WITHIN, connect, failure, seconds};
 use super::status::text;
-use super::{Answer, Context, Failure, Run};
+use super::{CommandContext, CommandFailure, CommandResult, Run};
 use crate::configurator::WAY_OUT;
 use crate::model::codes::{CLI_REFUSED, CLI_WHICH_WAY};
 use crate::session::NO_FORWARD;
@@ -37,20 +37,20 @@ pub struct Args {
 }
 
 impl Run for Args {
-    fn run(self, context: &Context) -> Answer {
+    fn run(self, context: &CommandContext) -> CommandResult {
         let json = self.json;
         self.show(context).map_err(|failure| failure.in_json(json))
     }
 }
 
 impl Args {
-    fn show(self, context: &Context) -> Answer {
+    fn show(self, context: &CommandContext) -> CommandResult {
         if self.forward {
-            return Err(Failure::no(CLI_REFUSED, NO_FORWARD, WAY_OUT));
+            return Err(CommandFailure::no(CLI_REFUSED, NO_FORWARD, WAY_OUT));
         }
         if !self.back && !self.accept {
             let message = "it is not said how to recover";
-            return Err(Failure::usage(CLI_WHICH_WAY, message, WAY_OUT));
+            return Err(CommandFailure::usage(CLI_WHICH_WAY, message, WAY_OUT));
         }
         let out = &context.out;
         let patience = Patience::within(self.within);

@@ -1,6 +1,6 @@
 //! What the commands that talk to a running deployment share: finding it, asking it, telling why not.
 
-use super::Failure;
+use super::CommandFailure;
 use super::exit::Exit;
 use super::kept;
 use crate::limits;
@@ -83,27 +83,27 @@ pub fn seconds(text: &str) -> Result<f64, String> {
 }
 
 /// Connects.
-pub fn connect(name: Option<&str>) -> Result<Client, Failure> {
+pub fn connect(name: Option<&str>) -> Result<Client, CommandFailure> {
     Client::connect(name).map_err(failure)
 }
 
 /// Connects, asks once, and gives the answer.
-pub fn ask(name: Option<&str>, method: &str, params: &Json, limit: Duration) -> Result<Json, Failure> {
+pub fn ask(name: Option<&str>, method: &str, params: &Json, limit: Duration) -> Result<Json, CommandFailure> {
     connect(name)?.call(method, params, limit).map_err(failure)
 }
 
 /// Why there is no answer, as a finding.
-pub fn failure(error: ClientError) -> Failure {
+pub fn failure(error: ClientError) -> CommandFailure {
     let meant = kept::meant(&error);
     match error {
         ClientError::None => {
             let help = "start one with `davit deploy FILE`, or look whether XDG_RUNTIME_DIR is the same here and there";
             let help = meant.map_or_else(|| help.to_owned(), |life| format!("{help}; {}", kept::ended(&life)));
-            Failure::no(CLI_NOT_RUNNING, "no deployment is running", help)
+            CommandFailure::no(CLI_NOT_RUNNING, "no deployment is running", help)
         }
-        ClientError::Several(names) => Failure {
+        ClientError::Several(names) => CommandFailure {
             exit: Exit::Usage,
-            ..Failure::usage(
+            ..CommandFailure::usage(
                 CLI_SEVERAL_RUNNING,
                 format!("{} deployments are running", names.len()),
                 format!("say which: {}", names.iter().map(|n| format!("`{n}`")).collect::<Vec<_>>().join(", ")),
@@ -111,30 +111,30 @@ pub fn failure(error: ClientError) -> Failure {
         },
         ClientError::Unknown { name, help } => {
             let help = meant.map_or(help, |life| kept::ended(&life));
-            Failure::no(CLI_NOT_RUNNING, format!("no deployment named `{name}` is running"), help)
+            CommandFailure::no(CLI_NOT_RUNNING, format!("no deployment named `{name}` is running"), help)
         }
-        ClientError::SocketGone { name, path } => Failure::no(
+        ClientError::SocketGone { name, path } => CommandFailure::no(
             CLI_SOCKET_GONE,
             format!("the deployment `{name}` runs, but its socket {} is gone", path.display()),
             "Ctrl-C in its terminal shuts it down in order, and so does SIGINT to its process: look for it with `pgrep -af \
              davit`",
         ),
-        ClientError::Untrusted(why) => Failure::no(
+        ClientError::Untrusted(why) => CommandFailure::no(
             CLI_UNTRUSTED,
             format!("not asked: {why}"),
             "set XDG_RUNTIME_DIR to a directory of yours, as where the deployment was started; a deployment of another user is \
              asked by that user",
         ),
-        ClientError::Io { name, source } => Failure {
+        ClientError::Io { name, source } => CommandFailure {
             exit: Exit::No,
-            ..Failure::no(
+            ..CommandFailure::no(
                 CLI_NO_ANSWER,
                 format!("the deployment `{name}` does not answer: {source}"),
                 "look at its terminal; `davit status` tries again, `davit shutdown --force` takes it down without its \
                  coordinator",
             )
         },
-        ClientError::Refused(error) => Failure::no(
+        ClientError::Refused(error) => CommandFailure::no(
             error.data.get("code").and_then(Json::as_str).and_then(page).map_or(CLI_REFUSED, |page| page.code),
             error.message.clone(),
             error.data.get("help").and_then(Json::as_str).unwrap_or("`davit log` shows what happened").to_owned(),

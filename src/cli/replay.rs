@@ -205,7 +205,7 @@ impl ScriptLines {
         self.line(format!("wait_answer({}, 0)", quoted(event)));
     }
 
-    /// A circle, again and again: the rounds between the first and the last one are all like the second.
+    /// A cycle, again and again: the rounds between the first and the last one are all like the second.
     fn again(&mut self, again: &Again) -> Result<(), String> {
         let last = again.steps.len() / again.round.max(1);
         for (number, steps) in again.steps.chunks(again.round.max(1)).enumerate() {

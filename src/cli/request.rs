@@ -5,7 +5,7 @@ use super::log::duration;
 use super::output::Style;
 use super::remote::{Patience, WITHIN, WaitFor, Which, ask, seconds};
 use super::status::text;
-use super::{Answer, Context, Failure, Run};
+use super::{CommandContext, CommandFailure, CommandResult, Run};
 use crate::configurator::WAY_OUT;
 use crate::model::finding::count;
 use serde_json::{Value as Json, json};
@@ -35,7 +35,7 @@ pub struct EventArgs {
 }
 
 impl Run for EventArgs {
-    fn run(self, context: &Context) -> Answer {
+    fn run(self, context: &CommandContext) -> CommandResult {
         let params = json!({
             "event": self.event, "wait": !self.no_wait, "wait_for": self.wait_for, "within_s": self.within
         });
@@ -105,7 +105,7 @@ pub struct ApplyArgs {
 }
 
 impl Run for ApplyArgs {
-    fn run(self, context: &Context) -> Answer {
+    fn run(self, context: &CommandContext) -> CommandResult {
         let params = json!({ "configuration": self.configuration, "force": self.force });
         let patience = Patience::within(self.wait.within);
         request(context, "apply", params, &self.which, &self.wait, &patience, self.json)
@@ -137,7 +137,7 @@ pub struct UndoArgs {
 }
 
 impl Run for UndoArgs {
-    fn run(self, context: &Context) -> Answer {
+    fn run(self, context: &CommandContext) -> CommandResult {
         let params = json!({ "configuration": self.configuration, "to": self.to, "force": self.force });
         let patience = Patience::within(self.wait.within);
         request(context, "undo", params, &self.which, &self.wait, &patience, self.json)
@@ -163,7 +163,7 @@ pub struct CommitArgs {
 }
 
 impl Run for CommitArgs {
-    fn run(self, context: &Context) -> Answer {
+    fn run(self, context: &CommandContext) -> CommandResult {
         let wait = WaitFor { no_wait: false, wait: true, within: self.within };
         let params = json!({ "force": self.force });
         let patience = Patience::within(wait.within);
@@ -173,14 +173,14 @@ impl Run for CommitArgs {
 
 /// Asks, and tells the answer if it is waited for.
 pub(super) fn request(
-    context: &Context,
+    context: &CommandContext,
     method: &str,
     mut params: Json,
     which: &Which,
     wait: &WaitFor,
     patience: &Patience,
     json: bool,
-) -> Result<Exit, Failure> {
+) -> Result<Exit, CommandFailure> {
     let waits = !wait.no_wait;
     params["wait"] = json!(waits);
     params["within_s"] = json!(wait.within);

@@ -7,9 +7,9 @@ use super::last_words;
 use super::output::Style;
 use super::progress::ProgressView;
 use super::signals::{self, SignalWatch};
-use super::{Answer, Context, Failure, Run};
+use super::{CommandContext, CommandFailure, CommandResult, Run};
 use crate::app::Extensions;
-use crate::app::script::{self, Door, Interrupt, Options, ScriptFailure};
+use crate::app::script::{self, Door, Interrupt, ScriptFailure, ScriptOptions};
 use crate::model::Ident;
 use crate::model::codes::{DEPLOY_UNKNOWN_PLATFORM, SCRIPT_FAILED, SCRIPT_SYNTAX};
 use crate::model::finding::did_you_mean;
@@ -48,14 +48,14 @@ pub struct Args {
 }
 
 impl Run for Args {
-    fn run(self, context: &Context) -> Answer {
+    fn run(self, context: &CommandContext) -> CommandResult {
         let json = self.json;
         self.story(context).map_err(|failure| failure.in_json(json))
     }
 }
 
 impl Args {
-    fn story(self, context: &Context) -> Answer {
+    fn story(self, context: &CommandContext) -> CommandResult {
         let platform = self.platform.as_deref().map(|name| known(name, &context.extensions)).transpose()?;
         let clock = self.clock.make(0.0);
         let progress = ProgressView::new(context.out, self.json, &clock).map_err(super::deploy::short)?;
@@ -78,7 +78,7 @@ impl Args {
         };
         let end = script::run(
             &self.script,
-            Options {
+            ScriptOptions {
                 clock: clock.clone(),
                 extensions: context.extensions.clone(),
                 load: self.parameters.options()?,
@@ -111,7 +111,7 @@ impl Args {
 fn door(clock: &Clock) -> Door {
     let clock = clock.clone();
     Box::new(move |session| {
-        let words = |failure: Failure| failure.message();
+        let words = |failure: CommandFailure| failure.message();
         let socket = super::deploy::open(session).map_err(words)?;
         session.hub().attach(socket.observer(&clock).map_err(super::deploy::short).map_err(words)?);
         Ok(Box::new(socket))
@@ -119,25 +119,27 @@ fn door(clock: &Clock) -> Door {
 }
 
 /// A platform of this program.
-fn known(name: &str, extensions: &Extensions) -> Result<Ident, Failure> {
+fn known(name: &str, extensions: &Extensions) -> Result<Ident, CommandFailure> {
     let known = extensions.platforms().any(|known| known == name);
     Ident::new(name).ok().filter(|_| known).ok_or_else(|| {
         let help = did_you_mean(name, "platforms", extensions.platforms());
-        Failure::usage(DEPLOY_UNKNOWN_PLATFORM, format!("this program has no platform `{name}`"), help)
+        CommandFailure::usage(DEPLOY_UNKNOWN_PLATFORM, format!("this program has no platform `{name}`"), help)
     })
 }
 
-fn tell(failure: ScriptFailure) -> Failure {
+fn tell(failure: ScriptFailure) -> CommandFailure {
     match failure {
         ScriptFailure::Unreadable(finding) => {
-            Failure { exit: Exit::Usage, findings: vec![*finding], ..Failure::default() }
+            CommandFailure { exit: Exit::Usage, findings: vec![*finding], ..CommandFailure::default() }
         }
         ScriptFailure::Lua { message, syntax: true } => {
-            Failure::usage(SCRIPT_SYNTAX, message, "mend the script where the message points")
+            CommandFailure::usage(SCRIPT_SYNTAX, message, "mend the script where the message points")
         }
-        ScriptFailure::Lua { message, syntax: false } => {
-            Failure::no(SCRIPT_FAILED, message, "what happened before is told above; `--json` tells it to a program")
-        }
+        ScriptFailure::Lua { message, syntax: false } => CommandFailure::no(
+            SCRIPT_FAILED,
+            message,
+            "what happened before is told above; `--json` tells it to a program",
+        ),
         ScriptFailure::Refused { refused, .. } => (*refused).into(),
     }
 }

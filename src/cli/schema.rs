@@ -1,7 +1,7 @@
 //! `davit schema`
 
 use super::exit::Exit;
-use super::{Answer, Context, Run, write_output};
+use super::{CommandContext, CommandResult, Run, write_output};
 use crate::lang::grammar::{FILES, File};
 use crate::lang::schema;
 use std::path::PathBuf;
@@ -53,7 +53,7 @@ impl SchemaOf {
 }
 
 impl Run for Args {
-    fn run(self, context: &Context) -> Answer {
+    fn run(self, context: &CommandContext) -> CommandResult {
         let text = match File::named(self.of.name()) {
             Some(file) if self.markdown => schema::markdown(file),
             Some(file) => format!("{:#}\n", schema::json_schema(file)),

@@ -4,7 +4,7 @@ use super::exit::Exit;
 use super::output::{Output, Style};
 use super::remote::{ASK, Patience, WITHIN, connect, failure, seconds};
 use super::status::text;
-use super::{Answer, Context, Run};
+use super::{CommandContext, CommandResult, Run};
 use crate::limits;
 use crate::session::StoppingView;
 use crate::session::client::Client;
@@ -34,14 +34,14 @@ pub struct Args {
 }
 
 impl Run for Args {
-    fn run(self, context: &Context) -> Answer {
+    fn run(self, context: &CommandContext) -> CommandResult {
         let json = self.json;
         self.show(context).map_err(|failure| failure.in_json(json))
     }
 }
 
 impl Args {
-    fn show(self, context: &Context) -> Answer {
+    fn show(self, context: &CommandContext) -> CommandResult {
         let out = &context.out;
         let patience = Patience::within(self.within);
         let mut client = connect(self.name.as_deref())?;

@@ -4,7 +4,7 @@ use super::exit::Exit;
 use super::input::{Parameters, coordinator};
 use super::output::{self, Style};
 use super::sim_editor::edit;
-use super::{Answer, Context, Failure, Run};
+use super::{CommandContext, CommandFailure, CommandResult, Run};
 use crate::functions::Opener;
 use crate::limits::{SIM_BYTES, SIM_LINE};
 use crate::model::codes::{CLI_EVENTS_UNREADABLE, FUNCTIONS_NOT_OPENED};
@@ -45,18 +45,23 @@ pub struct Args {
 }
 
 impl Run for Args {
-    fn run(self, context: &Context) -> Answer {
+    fn run(self, context: &CommandContext) -> CommandResult {
         let read = coordinator(&self.file, &self.parameters, self.of.as_deref(), &self.host)
             .map_err(|f| f.in_json(self.json))?;
         let (chart, mut findings) = compile(&read.chart);
         findings.splice(0..0, read.findings);
         let Some(chart) = chart else {
-            return Err(Failure { findings, sources: read.sources, json: self.json, ..Failure::default() });
+            return Err(CommandFailure {
+                findings,
+                sources: read.sources,
+                json: self.json,
+                ..CommandFailure::default()
+            });
         };
         context.out.findings(&findings, &read.sources);
         let input: Box<dyn Read> = match &self.events {
             Some(path) if path.as_os_str() != "-" => Box::new(std::fs::File::open(path).map_err(|error| {
-                Failure::usage(
+                CommandFailure::usage(
                     CLI_EVENTS_UNREADABLE,
                     format!("{}: {error}", path.display()),
                     "each line of the file is a set of events, `run`, or `advance SECONDS`; `-` is standard input",
@@ -77,7 +82,7 @@ impl Run for Args {
                     return edit(context, || Ok(Sim::with(&chart, open()?)));
                 }
                 let functions = opener.open(None).map_err(|failure| {
-                    Failure::usage(
+                    CommandFailure::usage(
                         FUNCTIONS_NOT_OPENED,
                         format!("the functions cannot be run: {failure}"),
                         "the text ran when it was read: does it depend on time or chance?",
@@ -101,7 +106,7 @@ fn with_notes(seen: &Observation) -> Json {
 }
 
 impl Args {
-    fn lines<F: Hook>(&self, context: &Context, mut sim: Sim<'_, F>, input: Box<dyn Read>) -> Answer {
+    fn lines<F: Hook>(&self, context: &CommandContext, mut sim: Sim<'_, F>, input: Box<dyn Read>) -> CommandResult {
         let out = &context.out;
         let mut exit = Exit::Done;
         // An input may have no end.
@@ -111,7 +116,7 @@ impl Args {
                 Ok(None) => break,
                 Ok(Some(line)) => line,
                 Err(error) => {
-                    return Err(Failure::usage(
+                    return Err(CommandFailure::usage(
                         CLI_EVENTS_UNREADABLE,
                         format!("the events cannot be read: {error}"),
                         "each line is a set of events, `run`, or `advance SECONDS`, as UTF-8 text",

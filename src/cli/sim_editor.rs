@@ -3,7 +3,7 @@
 use super::exit::Exit;
 use super::output::Style;
 use super::sim_session::SimSession;
-use super::{Answer, Context, Failure};
+use super::{CommandContext, CommandFailure, CommandResult};
 use crate::model::codes::CLI_EVENTS_UNREADABLE;
 use crate::statechart::{Hook, Sim};
 use rustyline::completion::Completer;
@@ -28,10 +28,10 @@ impl<C: Fn(&str) -> (usize, Vec<String>)> Completer for SimWords<C> {
 ///
 /// # Errors
 /// When the terminal cannot be read, or `make` can make no machine.
-pub fn edit<'c, F: Hook>(context: &Context, make: impl Fn() -> Result<Sim<'c, F>, String>) -> Answer {
+pub fn edit<'c, F: Hook>(context: &CommandContext, make: impl Fn() -> Result<Sim<'c, F>, String>) -> CommandResult {
     let unreadable = |error: &dyn std::fmt::Display| {
         let help = "`--events FILE` reads the events from a file, `--events -` from standard input";
-        Failure::usage(CLI_EVENTS_UNREADABLE, format!("the terminal cannot be read: {error}"), help)
+        CommandFailure::usage(CLI_EVENTS_UNREADABLE, format!("the terminal cannot be read: {error}"), help)
     };
     super::signals::give_terminal_back().map_err(|why| unreadable(&why))?;
     let session = SimSession::new(make).map_err(|why| unreadable(&why))?;

@@ -4,7 +4,7 @@ use super::exit::Exit;
 use super::output::{Style, Table};
 use super::remote::{ASK, ask};
 use super::status::text;
-use super::{Answer, Context, Run};
+use super::{CommandContext, CommandResult, Run};
 use serde_json::json;
 
 /// Show the applied configurations that can be undone, newest first.
@@ -19,7 +19,7 @@ pub struct Args {
 }
 
 impl Run for Args {
-    fn run(self, context: &Context) -> Answer {
+    fn run(self, context: &CommandContext) -> CommandResult {
         let out = &context.out;
         let stack =
             ask(self.name.as_deref(), "stack", &json!({}), ASK).map_err(|failure| failure.in_json(self.json))?;

@@ -6,7 +6,7 @@ use super::kept::{self, Died};
 use super::list::{Overview, of_phase, silent};
 use super::output::{Output, Style, Table};
 use super::remote::{ASK, failure};
-use super::{Answer, Context, Failure, Run};
+use super::{CommandContext, CommandFailure, CommandResult, Run};
 use crate::model::finding::count;
 use crate::session::client::{Client, ClientError};
 use crate::session::kept::Life;
@@ -30,7 +30,7 @@ pub struct Args {
 }
 
 impl Run for Args {
-    fn run(self, context: &Context) -> Answer {
+    fn run(self, context: &CommandContext) -> CommandResult {
         let out = &context.out;
         let refused = |error| Err(failure(error).in_json(self.json));
         match &self.names[..] {
@@ -70,7 +70,7 @@ enum SeenStatus {
     Runs(Json),
     Died(Box<Died>),
     /// It is not seen, and why; one of several.
-    Not(String, Failure),
+    Not(String, CommandFailure),
 }
 
 impl SeenStatus {

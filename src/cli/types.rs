@@ -1,9 +1,9 @@
 //! `davit types`
 
 use super::exit::Exit;
-use super::input::{Input, Parameters};
+use super::input::{CommandInput, Parameters};
 use super::output::{Output, Style, Table};
-use super::{Answer, Context, Failure, Run};
+use super::{CommandContext, CommandFailure, CommandResult, Run};
 use crate::diagnostics::Language;
 use crate::lang;
 use crate::model::codes::CLI_UNKNOWN_TYPE;
@@ -33,19 +33,19 @@ pub struct Args {
 }
 
 impl Run for Args {
-    fn run(self, context: &Context) -> Answer {
+    fn run(self, context: &CommandContext) -> CommandResult {
         let json = self.json;
         self.show(context).map_err(|failure| failure.in_json(json))
     }
 }
 
 impl Args {
-    fn show(self, context: &Context) -> Answer {
+    fn show(self, context: &CommandContext) -> CommandResult {
         let is_file =
             self.what.as_ref().is_some_and(|w| w.contains('/') || w.ends_with(".yaml") || w.ends_with(".yml"));
         let (catalogue, wanted) = if is_file {
             let file = PathBuf::from(self.what.unwrap_or_default());
-            let read = Input { file, parameters: self.parameters }.read(context)?;
+            let read = CommandInput { file, parameters: self.parameters }.read(context)?;
             (read.catalogue, self.ty)
         } else {
             let catalogue = match &self.library {
@@ -55,7 +55,7 @@ impl Args {
                     let Some(library) = found else {
                         let known: Vec<String> =
                             context.extensions.libraries.iter().map(|l| l.name().to_string()).collect();
-                        return Err(Failure::no(
+                        return Err(CommandFailure::no(
                             crate::model::codes::DEPLOY_UNKNOWN_LIBRARY,
                             format!("this program has no component library `{name}`"),
                             did_you_mean(name, "libraries", known.iter().map(String::as_str)),
@@ -75,7 +75,7 @@ impl Args {
                 // The name alone will do while only one library has it.
                 let only = by_last.next().filter(|_| by_last.next().is_none());
                 let Some(ty) = catalogue.iter().find(|ty| ty.name.as_str() == name).or(only) else {
-                    return Err(Failure::no(
+                    return Err(CommandFailure::no(
                         CLI_UNKNOWN_TYPE,
                         format!("there is no component type `{name}`"),
                         did_you_mean(&name, "types", catalogue.iter().map(|ty| ty.name.as_str())),

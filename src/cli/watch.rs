@@ -10,7 +10,7 @@ use super::log::duration;
 use super::output::{self, Output, Style, Table};
 use super::remote::{connect, failure, seconds};
 use super::status::{not_known, state_style, text};
-use super::{Answer, Context, Run};
+use super::{CommandContext, CommandResult, Run};
 use crate::model::finding::count;
 use crate::session::client::{Client, ClientError};
 use crate::session::owner;
@@ -53,14 +53,14 @@ fn pause(text: &str) -> Result<f64, String> {
 }
 
 impl Run for Args {
-    fn run(self, context: &Context) -> Answer {
+    fn run(self, context: &CommandContext) -> CommandResult {
         let json = self.json;
         self.show(context).map_err(|failure| failure.in_json(json))
     }
 }
 
 impl Args {
-    fn show(self, context: &Context) -> Answer {
+    fn show(self, context: &CommandContext) -> CommandResult {
         let out = &context.out;
         let client = connect(self.name.as_deref())?;
         let name = client.name().to_owned();

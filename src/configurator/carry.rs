@@ -5,16 +5,15 @@ use super::hands::Hands;
 use super::inbox::PoolReply;
 use super::pool::{CallFor, PlatformCall};
 use super::progress::{Progress, StepEnd, StepName};
-use super::running::{Flight, Purpose, Running};
+use super::running::{OutstandingCall, Purpose, Running};
 use crate::limits;
 use crate::model::{Cause, Execution, Outcome, Snapshot, Step};
-use crate::platform::Ended;
+use crate::platform::{TimedOutcome, TimedStep};
 use crate::time::Time;
 use crate::transaction::{Can, Doing, Input, Poll};
-use smallvec::{SmallVec, smallvec};
+use smallvec::SmallVec;
 use std::collections::BTreeMap;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 
 /// After so many immediate steps the mail is looked at.
 const GLANCE: usize = 64;
@@ -37,11 +36,15 @@ impl Engine {
         let mut did = self.land(running);
         let platform = self.given.platform.clone();
         let execution = |step: &Step| platform.execution(step);
+        let batches = |step: &Step| platform.batches(step);
         let mut now = self.given.clock.now();
         let mut inline = 0;
         loop {
-            if !running.is_safe() && self.urgent() {
-                running.stop_brief();
+            let gives_way = !running.is_safe() && self.urgent();
+            if gives_way || running.machine.begins_no_more() {
+                running.stop_batches(&*platform);
+            }
+            if gives_way {
                 // Steps that are begun one by one in this thread stop here; what is out is told by whoever is urgent.
                 if inline > 0 {
                     return true;
@@ -57,7 +60,8 @@ impl Engine {
                     continue;
                 }
             }
-            let can = Can { execution: &execution, room, quarantined: &self.world.quarantined, busy: &busy };
+            let quarantined = &self.world.quarantined;
+            let can = Can { execution: &execution, batches: &batches, room, quarantined, busy: &busy };
             match running.machine.poll(&mut self.world.system, now, &can) {
                 Poll::Over => {
                     running.over = true;
@@ -140,43 +144,31 @@ impl Engine {
     /// for none of the others.
     fn has_room(&self, running: &Running) -> bool {
         if self.whose(running, CallFor::Plain) == CallFor::Safe {
-            return self.pool.has_room_for_safe(running.flights.len());
+            return self.pool.has_room_for_safe(running.outstanding.len());
         }
-        let others = self.running.iter().filter(|other| other.flights.is_empty() && !other.over).count();
-        self.pool.has_room_beside(if running.flights.is_empty() { 0 } else { others })
+        let others = self.running.iter().filter(|other| other.outstanding.is_empty() && !other.over).count();
+        self.pool.has_room_beside(if running.outstanding.is_empty() { 0 } else { others })
     }
 
-    /// Hands steps to a worker: one of any kind, or several brief ones. Their preconditions hold.
+    /// Hands steps to a worker. Their preconditions hold.
     fn launch(&mut self, running: &mut Running, steps: SmallVec<[u32; 1]>) {
-        let started = self.given.clock.now();
-        let stop = Arc::<AtomicBool>::default();
-        let step = |i: &u32| &running.machine.step(*i).step;
-        steps.iter().for_each(|i| self.tell_started(step(i)));
-        let (call, deadline) = match *steps {
-            [i] => (
-                PlatformCall::Execute(step(&i).clone(), running.enters_quarantine),
-                running.machine.deadline(i, started),
-            ),
-            _ => {
-                let several = steps.iter().map(|i| step(i).clone()).collect();
-                let all = || steps.iter().map(|i| running.machine.limit_of(*i));
-                let patience = all().map(|limit| limit.patience).max().unwrap_or_default();
-                let latest = all().map(|limit| limit.until).max().unwrap_or(Time::NEVER);
-                // The last of them begins within the turn.
-                let until = (started + patience + limits::BRIEF_TURN).min(latest);
-                (PlatformCall::Several(several, patience, stop.clone()), until)
-            }
+        let timed = |i: &u32| {
+            let (step, limit) = (&running.machine.step(*i).step, running.machine.limit_of(*i));
+            self.tell_started(step);
+            TimedStep { step: step.clone(), patience: limit.patience, until: limit.until }
         };
-        let ticket = self.call(call, deadline, self.whose(running, CallFor::Plain));
-        running.flights.push(Flight { ticket, steps, started, deadline, stop });
+        let batch = self.pool.batch(steps.iter().map(timed).collect(), running.enters_quarantine);
+        let call = PlatformCall::Execute(batch.clone());
+        let ticket = self.call(call, batch.deadline(), self.whose(running, CallFor::Plain));
+        running.outstanding.push(OutstandingCall { ticket, steps, back: 0, batch, bound: Time::NEVER });
     }
 
     /// A call is given up: it is told so, and is waited for no longer than a step may take.
     fn cancel(&mut self, running: &mut Running, step: u32) {
         let until = self.given.clock.now() + self.given.limits.step_timeout;
-        if let Some(flight) = running.flights.iter_mut().find(|flight| flight.steps.contains(&step)) {
-            flight.deadline = flight.deadline.min(until);
-            flight.stop.store(true, Ordering::Release);
+        if let Some(call) = running.outstanding.iter_mut().find(|call| call.is_of(step)) {
+            call.bound = call.bound.min(until);
+            call.batch.stop();
             self.given.platform.cancel(&running.machine.step(step).step);
         }
     }
@@ -202,38 +194,43 @@ impl Engine {
                 did = true;
             }
         }
-        let unknown = |cause| Ended { outcome: Outcome::Unknown(cause), took: None };
         let mut at = 0;
-        while at < running.flights.len() {
-            let flight = &running.flights[at];
-            let several = flight.steps.len();
-            let ended: SmallVec<[Ended; 1]> = match self.pool.take(flight.ticket) {
-                Some(PoolReply::Executed(outcome)) => smallvec![Ended { outcome, took: None }],
-                Some(PoolReply::Several(ended)) => SmallVec::from_vec(ended),
-                Some(_) => smallvec![unknown(Cause::Lost("the answer was to another question".to_owned())); several],
-                None if now >= flight.deadline + limits::PLATFORM_GRACE => {
-                    self.pool.give_up(flight.ticket);
-                    smallvec![unknown(Cause::Timeout); several]
-                }
-                None => {
-                    at += 1;
-                    continue;
-                }
-            };
-            did = true;
-            self.note_quarantine();
-            let flight = running.flights.remove(at);
-            let mut ended = ended.into_iter().fuse();
-            for (place, step) in flight.steps.into_iter().enumerate() {
-                let silent = || (place == 0).then(|| unknown(Cause::Lost("the platform said nothing".to_owned())));
-                let Some(Ended { outcome, took }) = ended.next().or_else(silent) else {
+        while at < running.outstanding.len() {
+            let call = &mut running.outstanding[at];
+            let returned = self.pool.take(call.ticket).is_some();
+            let late = !returned && now >= call.deadline();
+            if late {
+                self.pool.give_up(call.ticket);
+                call.batch.close();
+            }
+            let answers = call.batch.take(returned || late);
+            let first = call.back;
+            call.back += answers.len();
+            let steps: SmallVec<[u32; 1]> = call.steps[first..call.back].iter().copied().collect();
+            let stopped = call.batch.is_stopped() && call.steps.len() > 1;
+            let mut not_begun = SmallVec::<[u32; 1]>::new();
+            if returned || late {
+                not_begun.extend_from_slice(&call.steps[call.back..]);
+                running.outstanding.remove(at);
+            } else {
+                at += 1;
+            }
+            did |= !answers.is_empty() || !not_begun.is_empty() || returned || late;
+            if returned || late || !steps.is_empty() {
+                self.note_quarantine();
+            }
+            for (step, TimedOutcome { outcome, took }) in steps.into_iter().zip(answers) {
+                // What was to stop, and had not begun, comes again where it is still wanted.
+                if stopped && outcome == Outcome::NotDone(Cause::Cancelled) {
                     running.machine.on(Input::NotBegun(step), &mut self.world.system);
                     continue;
-                };
-                let took = took.unwrap_or_else(|| now.since(flight.started));
+                }
                 self.tell(running, step, StepEnd::from(&outcome), Some(took));
                 running.machine.on(Input::Ended { step, outcome }, &mut self.world.system);
                 self.steps += 1;
+            }
+            for step in not_begun {
+                running.machine.on(Input::NotBegun(step), &mut self.world.system);
             }
         }
         did

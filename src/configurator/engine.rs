@@ -14,7 +14,7 @@ use super::safety::Safety;
 use super::suspects::Suspects;
 use super::switches::Fast;
 use crate::model::{Ask, ConfigId, Configuration, DeploymentLimits, RequestId, Snapshot, Verdict};
-use crate::plan::Context;
+use crate::plan::PlanContext;
 use crate::platform::{Platform, PlatformEvent};
 use crate::stack::claims::Claims;
 use crate::stack::{Arrived, Batch, Desk, FrameId, Requester, Why, World};
@@ -43,7 +43,7 @@ pub(super) struct Given {
     pub force: Force,
     /// What an operator may apply, beside what is safe.
     pub operator: FxHashSet<ConfigId>,
-    pub context: Context,
+    pub context: PlanContext,
     pub coordinators: BTreeSet<Requester>,
     pub answers: AnswerSink,
     pub progress: Option<ProgressSink>,
@@ -140,7 +140,7 @@ impl Engine {
                 // told so.
                 if catch_unwind(AssertUnwindSafe(|| self.start_anew(&text))).is_err() {
                     self.running.clear();
-                    self.desk.under_way().to_vec().iter().for_each(|turn| self.desk.over(turn.number));
+                    self.desk.under_way().to_vec().iter().for_each(|active| self.desk.over(active.number));
                     let _ = catch_unwind(AssertUnwindSafe(|| self.break_current(&Reason::Panic(text))));
                     self.current.clear();
                 }
@@ -159,7 +159,7 @@ impl Engine {
             let mut did = self.serve_safe();
             if !self.running.iter().any(Running::is_safe) {
                 while !self.waits_for_a_look()
-                    && let Some(number) = self.turn()
+                    && let Some(number) = self.begin_next()
                 {
                     did = true;
                     self.begin(number);
@@ -201,11 +201,11 @@ impl Engine {
     }
 
     /// The next batch that may begin, by its number.
-    pub fn turn(&mut self) -> Option<u32> {
+    pub fn begin_next(&mut self) -> Option<u32> {
         self.heed_leaving();
         let Self { desk, given, world, leaving, .. } = self;
         let alone = |batch: &Batch| leaving.is_some() && world.stack.goes_alone(batch);
-        desk.turn(&given.claims, alone).map(|turn| turn.number)
+        desk.begin_next(&given.claims, alone).map(|active| active.number)
     }
 
     /// Takes in what has come, waiting for something until `until`.
@@ -252,6 +252,7 @@ impl Engine {
             }
             // Whoever waits for it looks.
             Mail::Truths => self.counts.truths.store(false, Ordering::Release),
+            Mail::Answers => self.counts.answers.store(false, Ordering::Release),
             Mail::Event(event) => {
                 self.counts.report_taken();
                 self.confirmations.came(event, self.given.clock.now(), !self.current.is_empty());

@@ -12,7 +12,7 @@ use super::switches::Fast;
 use super::teardown::own_plan;
 use crate::limits;
 use crate::model::{Ask, Cause, Outcome, Step};
-use crate::stack::{Batch, Group, HandOver, Planned, Resolved, Switch, Why, World, may_apply};
+use crate::stack::{Batch, Group, HandOver, Planned, ResolvedStep, Switch, Why, World, may_apply};
 use crate::time::Time;
 use crate::transaction::Transaction;
 use smallvec::SmallVec;
@@ -124,7 +124,7 @@ impl Engine {
     /// A request that came alone is under way on the empty desk.
     fn takes_place(&mut self, request: Request) -> Option<u32> {
         let _ = self.desk.arrive(Batch::one(request), |_| false, &self.given.claims);
-        self.turn()
+        self.begin_next()
     }
 
     /// Carries out the steps, from `at` on, which becomes the time of the last look at the clock: a look costs as much as a
@@ -139,7 +139,7 @@ impl Engine {
     ) -> Result<(), (u32, Outcome)> {
         let deadline = *at + self.given.limits.step_timeout;
         let mut sent = 0u32;
-        while let Some(Resolved { step, place, index, value }) = fast.switch.step(sent as usize, undoing) {
+        while let Some(ResolvedStep { step, place, index, value }) = fast.switch.step(sent as usize, undoing) {
             let name = StepName::of(step);
             if let Some(progress) = &self.given.progress {
                 progress(&Progress::Started(name));

@@ -9,7 +9,7 @@ use super::progress::{AnswerSink, ProgressSink};
 use super::request::{Answer, Batch, QueueFull, Reason, Request, Residual};
 use crate::limits;
 use crate::model::{Ask, Catalogue, ConfigId, Configuration, DeploymentLimits, EventName, Ident};
-use crate::plan::Context;
+use crate::plan::PlanContext;
 use crate::platform::{Platform, PlatformEvent};
 use crate::stack::claims::Claims;
 use crate::stack::{Requester, World};
@@ -79,7 +79,7 @@ impl Configurator {
             configurations: Arc::new(configurations),
             force,
             operator: setup.operator.into_iter().collect(),
-            context: Context { activities: setup.activities, avoid: BTreeSet::new() },
+            context: PlanContext { activities: setup.activities, avoid: BTreeSet::new() },
             coordinators: setup.coordinators,
             answers: setup.answers.clone(),
             progress: setup.progress,

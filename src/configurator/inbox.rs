@@ -6,8 +6,8 @@
 use super::control::{ControlCommand, UrgentCommand};
 use super::request::{Batch, Request};
 use crate::limits;
-use crate::model::{ComponentSnapshot, EventName, Outcome, Snapshot};
-use crate::platform::{Ended, ObserveError, PlatformEvent};
+use crate::model::{ComponentSnapshot, EventName, Snapshot};
+use crate::platform::{ObserveError, PlatformEvent};
 use crate::stack::Requester;
 use crate::time::{Clock, Receiver, Sender, TrySendError};
 use std::collections::BTreeSet;
@@ -20,8 +20,8 @@ pub(super) struct PoolTicket(pub u64);
 
 /// What came of a call.
 pub(super) enum PoolReply {
-    Executed(Outcome),
-    Several(Vec<Ended>),
+    /// The call has returned; the answers are in its batch.
+    Executed,
     Observed(Result<Snapshot, ObserveError>),
     ObservedComponent(Result<Option<ComponentSnapshot>, ObserveError>),
 }
@@ -32,6 +32,8 @@ pub(super) enum Mail {
     Request(Request),
     Batch(Box<Batch>),
     Reply(PoolTicket, PoolReply),
+    /// Calls that are out have answered some of their steps.
+    Answers,
     /// A component became faulted, or came back.
     Platform(PlatformEvent),
     /// An event that some configuration waits for as its confirmation.
@@ -50,6 +52,8 @@ pub(super) struct Counts {
     pub safe: AtomicUsize,
     /// A [`Mail::Truths`] is on its way.
     pub truths: AtomicBool,
+    /// A [`Mail::Answers`] is.
+    pub answers: AtomicBool,
     /// Somebody wants force.
     pub hurried: AtomicBool,
     /// The event that ends the deployment came, and it is not down since.
@@ -79,7 +83,7 @@ pub(super) fn new(clock: &Clock) -> (Post, Receiver<Mail>) {
         + 2 * limits::WORKERS_SAFE
         + limits::CONFIGURATOR_COMMANDS
         + limits::CONFIGURATOR_CONTROL
-        + 1;
+        + 2;
     let (sender, receiver) = clock.channel(room);
     (Post { sender, counts: Arc::default() }, receiver)
 }
@@ -161,6 +165,13 @@ impl Post {
     pub fn truths(&self) {
         if !self.counts.truths.swap(true, Ordering::AcqRel) && self.sender.try_send(Mail::Truths).is_err() {
             self.counts.truths.store(false, Ordering::Release);
+        }
+    }
+
+    /// Says that steps of calls that are out were answered, once until that is taken in.
+    pub fn answers(&self) {
+        if !self.counts.answers.swap(true, Ordering::AcqRel) && self.sender.try_send(Mail::Answers).is_err() {
+            self.counts.answers.store(false, Ordering::Release);
         }
     }
 

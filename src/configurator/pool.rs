@@ -8,20 +8,15 @@
 use super::inbox::{Mail, PoolReply, PoolTicket, Post};
 use crate::limits;
 use crate::model::{ComponentName, Step};
-use crate::platform::{Cause, Ended, ObserveError, Outcome, Platform};
+use crate::platform::{Cause, ObserveError, Outcome, Platform, StepBatch, TimedStep};
 use crate::time::{Clock, Receiver, Sender, Time, TrySendError};
 use rustc_hash::FxHashSet;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
-use std::time::Duration;
 
 /// What a worker is to call.
 pub(super) enum PlatformCall {
-    /// One step; whether it belongs to a safe configuration.
-    Execute(Step, bool),
-    /// Several brief steps, each with so much time; none is begun any more once it is set.
-    Several(Vec<Step>, Duration, Arc<AtomicBool>),
+    Execute(StepBatch),
     Observe,
     ObserveSome(Vec<ComponentName>),
     ObserveComponent(ComponentName),
@@ -48,6 +43,8 @@ pub(super) struct Pool {
     clock: Clock,
     platform: Arc<dyn Platform>,
     post: Post,
+    /// Has the configurator look at what calls that are out have answered.
+    tell: Arc<dyn Fn() + Send + Sync>,
     jobs: (Sender<PoolJob>, Receiver<PoolJob>),
     /// Workers that wait for a job or are at one, not counting those given up.
     workers: usize,
@@ -64,25 +61,23 @@ pub(super) struct Pool {
     told: bool,
 }
 
-/// Calls `platform` and survives its panic: whether the step happened is then unknown.
+/// Calls `platform` for an immediate step and survives its panic: whether the step happened is then unknown.
 pub(super) fn execute(platform: &dyn Platform, step: &Step, deadline: Time, safe: bool) -> Outcome {
     let call = || if safe { platform.execute_safe(step, deadline) } else { platform.execute(step, deadline) };
-    catch_unwind(AssertUnwindSafe(call)).unwrap_or_else(|payload| {
-        Outcome::Unknown(Cause::Lost(format!("the platform panicked: {}", crate::time::clock::panic_text(&*payload))))
-    })
+    catch_unwind(AssertUnwindSafe(call)).unwrap_or_else(|payload| Outcome::Unknown(Cause::Lost(panicked(&*payload))))
+}
+
+fn panicked(payload: &(dyn std::any::Any + Send)) -> String {
+    format!("the platform panicked: {}", crate::time::clock::panic_text(payload))
 }
 
 fn perform(platform: &dyn Platform, call: PlatformCall, deadline: Time) -> PoolReply {
     let lost = || ObserveError::Lost("the platform panicked".to_owned());
     match call {
-        PlatformCall::Execute(step, safe) => PoolReply::Executed(execute(platform, &step, deadline, safe)),
-        PlatformCall::Several(steps, each, stop) => {
-            let count = steps.len();
-            let several = catch_unwind(AssertUnwindSafe(|| platform.execute_brief(steps, each, deadline, &stop)));
-            PoolReply::Several(several.unwrap_or_else(|_| {
-                let outcome = Outcome::Unknown(Cause::Lost("the platform panicked".to_owned()));
-                vec![Ended { outcome, took: None }; count]
-            }))
+        PlatformCall::Execute(batch) => {
+            let lost = catch_unwind(AssertUnwindSafe(|| platform.execute_batch(&batch))).err();
+            batch.returned(lost.map(|payload| panicked(&*payload)).as_deref());
+            PoolReply::Executed
         }
         PlatformCall::Observe => PoolReply::Observed(
             catch_unwind(AssertUnwindSafe(|| platform.observe(deadline))).unwrap_or_else(|_| Err(lost())),
@@ -100,10 +95,12 @@ fn perform(platform: &dyn Platform, call: PlatformCall, deadline: Time) -> PoolR
 impl Pool {
     pub fn new(clock: Clock, platform: Arc<dyn Platform>, post: Post, bound: usize) -> Self {
         let jobs = clock.channel(bound.max(1) + limits::WORKERS_GIVEN_UP + 2 * limits::WORKERS_SAFE);
+        let told = post.clone();
         Self {
             clock,
             platform,
             post,
+            tell: Arc::new(move || told.answers()),
             jobs,
             workers: 0,
             busy: 0,
@@ -124,6 +121,11 @@ impl Pool {
     /// Whether a worker can be had for what is safe, of which so many calls are out: it does not wait for others that are stuck.
     pub fn has_room_for_safe(&self, out: usize) -> bool {
         out < self.bound && self.busy < self.bound + limits::WORKERS_SAFE
+    }
+
+    /// Steps that are to be carried out in one call; whether they belong to a safe configuration.
+    pub fn batch(&self, steps: Vec<TimedStep>, safe: bool) -> StepBatch {
+        StepBatch::telling(self.clock.clone(), steps, safe, self.tell.clone())
     }
 
     /// Hands `call` to a worker.
@@ -158,10 +160,9 @@ impl Pool {
     /// A call is not made.
     fn refuse(&mut self, ticket: PoolTicket, call: &PlatformCall, why: &str) {
         let reply = match call {
-            PlatformCall::Execute(..) => PoolReply::Executed(Outcome::NotDone(Cause::Lost(why.to_owned()))),
-            PlatformCall::Several(..) => {
-                let outcome = Outcome::NotDone(Cause::Lost(why.to_owned()));
-                PoolReply::Several(vec![Ended { outcome, took: None }])
+            PlatformCall::Execute(batch) => {
+                batch.not_begun(Cause::Lost(why.to_owned()));
+                PoolReply::Executed
             }
             PlatformCall::Observe | PlatformCall::ObserveSome(_) => {
                 PoolReply::Observed(Err(ObserveError::Lost(why.to_owned())))

@@ -221,8 +221,8 @@ impl Engine {
                 let _ = step::apply(back, &mut expected);
             }
         }
-        for turn in self.desk.under_way().to_vec() {
-            self.desk.over(turn.number);
+        for active in self.desk.under_way().to_vec() {
+            self.desk.over(active.number);
         }
         // It may have been taking everything down: what comes from now on begins again.
         self.taking_down = false;

@@ -42,7 +42,7 @@ impl Engine {
 
     /// Mends what a request is about to undo. False: it was answered, since that does not go.
     pub(super) fn repair_for(&mut self, number: u32, at: usize) -> bool {
-        let Some(request) = self.desk.turn_of(number).map(|turn| turn.batch.requests[0]) else { return false };
+        let Some(request) = self.desk.active(number).map(|active| active.batch.requests[0]) else { return false };
         match self.repair(at, By::Request(number)) {
             Ok(()) => true,
             Err(residual) => {
@@ -90,7 +90,7 @@ impl Engine {
     /// The request that something is repaired for; one that a safe configuration has overtaken is marked since.
     fn request_of(&self, by: By) -> Option<&Request> {
         let By::Request(number) = by else { return None };
-        self.desk.turn_of(number).and_then(|turn| turn.batch.requests.first())
+        self.desk.active(number).and_then(|active| active.batch.requests.first())
     }
 
     /// Whether something may move for who has it repaired: asked only when it is known what, since a safe configuration may come

@@ -32,8 +32,8 @@ struct Carried<'c> {
 impl Engine {
     /// A batch begins.
     pub(super) fn begin(&mut self, number: u32) {
-        let Some(turn) = self.desk.turn_of(number) else { return };
-        let requests: SmallVec<[Request; 2]> = SmallVec::from_slice(&turn.batch.requests);
+        let Some(active) = self.desk.active(number) else { return };
+        let requests: SmallVec<[Request; 2]> = SmallVec::from_slice(&active.batch.requests);
         for request in &requests {
             self.owe(*request);
         }
@@ -52,10 +52,10 @@ impl Engine {
         let mut looked = false;
         // Once it is taken down nothing begins that had not begun: the rest is answered by that.
         while !self.taking_down {
-            let Some(turn) = self.desk.turn_of(number) else { return };
-            let (requests, alone) = (turn.batch.requests.clone(), turn.alone);
+            let Some(active) = self.desk.active(number) else { return };
+            let (requests, alone) = (active.batch.requests.clone(), active.alone);
             // Given up together with one before it, of which it was to be taken up anew.
-            if let Some(place) = turn.given_up.iter().map(|given_up| given_up.place).min() {
+            if let Some(place) = active.given_up.iter().map(|given_up| given_up.place).min() {
                 self.cancel_behind(number, place, requests[place]);
                 continue;
             }
@@ -118,7 +118,7 @@ impl Engine {
             }
             let Some(planned) = group.planned.take() else {
                 self.book(number, group, Vec::new(), None);
-                if self.desk.under_way().iter().all(|turn| turn.number != number) {
+                if self.desk.under_way().iter().all(|active| active.number != number) {
                     return;
                 }
                 continue;
@@ -195,8 +195,8 @@ impl Engine {
 
     /// Books what came of a group of requests and answers them, in the order of the batch.
     fn book(&mut self, number: u32, group: Group, parts: Vec<PartEnd>, carried: Option<Carried<'_>>) {
-        let Some(turn) = self.desk.turn_of(number) else { return };
-        let requests = turn.batch.requests.clone();
+        let Some(active) = self.desk.active(number) else { return };
+        let requests = active.batch.requests.clone();
         let busy = self.held_frames();
         let parts = self.mended(&group, parts, carried.as_ref().is_some_and(|carried| carried.reason.is_some()));
         let endings: Endings = parts.iter().map(PartEnd::ending).collect();
@@ -350,7 +350,7 @@ impl Engine {
             (Some(running), Some(part)) => running.machine.on(Input::GiveUp { part }, &mut self.world.system),
             // It stands behind in its batch and has not begun.
             _ => {
-                let request = self.desk.turn_of(number).map(|turn| turn.batch.requests[place]);
+                let request = self.desk.active(number).map(|active| active.batch.requests[place]);
                 request.into_iter().for_each(|request| self.cancel_behind(number, place, request));
             }
         }

@@ -3,21 +3,41 @@
 use super::inbox::PoolTicket;
 use crate::limits;
 use crate::model::RequestId;
+use crate::platform::{Platform, StepBatch};
 use crate::stack::{Frame, FrameId, Group, Request};
 use crate::time::Time;
 use crate::transaction::{Question, Touched, Transaction};
 use smallvec::SmallVec;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
-/// A call that is out: one blocking step, or several brief ones.
-pub(super) struct Flight {
+/// A call that is out.
+pub(super) struct OutstandingCall {
     pub ticket: PoolTicket,
+    /// The steps, by their numbers in the list in hand, and how many of them are back.
     pub steps: SmallVec<[u32; 1]>,
-    pub started: Time,
-    pub deadline: Time,
-    /// Set: no further one of several is to be begun.
-    pub stop: Arc<AtomicBool>,
+    pub back: usize,
+    pub batch: StepBatch,
+    /// It was given up: it is waited for no longer.
+    pub bound: Time,
+}
+
+impl OutstandingCall {
+    /// When it must have told something.
+    pub fn deadline(&self) -> Time {
+        self.batch.deadline().min(self.bound) + limits::PLATFORM_GRACE
+    }
+
+    pub fn is_of(&self, step: u32) -> bool {
+        self.steps[self.back..].contains(&step)
+    }
+
+    /// No further one of its steps is to begin; the platform is told what it has taken.
+    fn stop(&self, platform: &dyn Platform) {
+        if self.steps.len() > 1 && !self.batch.is_stopped() {
+            self.batch.stop();
+            // The first may have begun, and goes on.
+            self.batch.under_way().iter().skip(1).for_each(|timed| platform.cancel(&timed.step));
+        }
+    }
 }
 
 /// A condition that is being evaluated for a transaction, and until when it is waited for.
@@ -46,7 +66,7 @@ pub(super) struct Running {
     pub purpose: Purpose,
     /// The request that each part of the plan serves, for the log.
     pub serves: SmallVec<[RequestId; 2]>,
-    pub flights: Vec<Flight>,
+    pub outstanding: Vec<OutstandingCall>,
     pub read: Option<(PoolTicket, Time)>,
     pub asked: Vec<AskedBatch>,
     /// Parts that stand for what they should, with the numbers of their conditions.
@@ -74,7 +94,7 @@ impl Running {
             enters_quarantine: matches!(purpose, Purpose::Safe(_)),
             purpose,
             serves,
-            flights: Vec::new(),
+            outstanding: Vec::new(),
             read: None,
             asked: Vec::new(),
             stood: Vec::new(),
@@ -90,14 +110,14 @@ impl Running {
 
     /// When something must be looked at again, if nothing comes.
     pub fn until(&self) -> Time {
-        let flights = self.flights.iter().map(|flight| flight.deadline + limits::PLATFORM_GRACE);
+        let outstanding = self.outstanding.iter().map(OutstandingCall::deadline);
         let asked = self.asked.iter().map(|asked| asked.until);
-        flights.chain(self.read.map(|(_, until)| until)).chain(asked).min().unwrap_or(Time::NEVER)
+        outstanding.chain(self.read.map(|(_, until)| until)).chain(asked).min().unwrap_or(Time::NEVER)
     }
 
-    /// No further one of the brief steps that are out is to be begun.
-    pub fn stop_brief(&self) {
-        self.flights.iter().for_each(|flight| flight.stop.store(true, Ordering::Release));
+    /// No further step of the calls that are out is to begin.
+    pub fn stop_batches(&self, platform: &dyn Platform) {
+        self.outstanding.iter().for_each(|call| call.stop(platform));
     }
 
     pub fn serves(&self, step: u32) -> RequestId {

@@ -7,7 +7,7 @@ use super::engine::Engine;
 use super::request::{Reason, Request};
 use super::running::{Purpose, Running};
 use crate::model::{Ask, ComponentName, ConfigId, Step, Target, Verdict};
-use crate::stack::{Effort, Frame, Residual, SafeEnd, Stack, effort};
+use crate::stack::{BestEffort, Frame, Residual, SafeEnd, Stack, effort};
 use crate::system::{System, step, touch};
 use crate::transaction::{BrokenPart, Input, PartEnd, Spec, Touched, Transaction};
 use smallvec::SmallVec;
@@ -47,7 +47,7 @@ impl Engine {
         let plan = |system: &System, stack: &Stack, earlier: &[Step]| {
             effort(&with(system, earlier), stack, configuration, &request, at, &self.given.context)
         };
-        let Effort { mut planned, frame, troubles } = plan(&self.world.system, &self.world.stack, &earlier);
+        let BestEffort { mut planned, frame, troubles } = plan(&self.world.system, &self.world.stack, &earlier);
         let mut yields = false;
         for other in self.running.iter_mut().filter(|other| comes_after.contains(&other.number)) {
             // Its own frame tells what it wanted, whoever does it.
@@ -112,7 +112,7 @@ impl Engine {
             if meets(&self.running[at]) {
                 self.running[at].machine.on(Input::Interrupt(id), &mut self.world.system);
                 // Calls that are out are told first, and what is back is taken in.
-                self.running[at].stop_brief();
+                self.running[at].stop_batches(&*self.given.platform);
                 self.advance(at);
             }
         }

@@ -7,7 +7,7 @@ use super::running::{Purpose, Running};
 use crate::limits;
 use crate::model::{ConfigId, Origin, RequestId, Step};
 use crate::plan::{PlanStage, PlannedStep};
-use crate::stack::{Broken, Effort, FrameId, Part, Planned, Requester, Residual, Why, effort};
+use crate::stack::{BestEffort, Broken, FrameId, Part, Planned, Requester, Residual, Why, effort};
 use crate::system::{self, Reversibility, System, Undo};
 use crate::time::Time;
 use crate::transaction::{Input, Limit, Spec, Transaction};
@@ -126,10 +126,11 @@ impl Engine {
                 _ => None,
             })
             .collect();
-        let left: Vec<_> = self.desk.under_way().iter().filter(|turn| !begun.contains(&turn.number)).cloned().collect();
-        for turn in left {
-            for request in turn.batch.requests {
-                let gone = self.desk.answered(turn.number, 0, Some(request.ask.failed()));
+        let left: Vec<_> =
+            self.desk.under_way().iter().filter(|active| !begun.contains(&active.number)).cloned().collect();
+        for active in left {
+            for request in active.batch.requests {
+                let gone = self.desk.answered(active.number, 0, Some(request.ask.failed()));
                 match request.why {
                     Why::Asked => self.answer(request, request.ask.failed(), Some(Reason::TakenDown)),
                     _ => self.forget(request),
@@ -154,7 +155,7 @@ impl Engine {
             let Some(configuration) = configurations.get(id) else { continue };
             let request = Request::new(RequestId(0), crate::model::Ask::Apply(*id), Requester::Operator);
             let at = self.given.clock.now();
-            let Effort { mut planned, troubles: left_out, .. } =
+            let BestEffort { mut planned, troubles: left_out, .. } =
                 effort(&self.world.system, &self.world.stack, configuration, &request, at, &self.given.context);
             // What brings it to rest may take the time that it gives itself.
             let patience = self.patience([*id]);

@@ -4,7 +4,9 @@ use crate::limits;
 use crate::model::finding::Finding;
 use crate::model::names::EventName;
 use crate::model::{codes, finding};
-use crate::statechart::{AtOnce, Chart, Hook, Machine, Mode, Nobody, NodeId, Raised, Said, TurnResult, Watched};
+use crate::statechart::{
+    AtOnce, Chart, FunctionOutput, Hook, Machine, MicrostepResult, Mode, Nobody, NodeId, Raised, Watched,
+};
 use crate::time::Time;
 use std::sync::Arc;
 
@@ -60,7 +62,7 @@ pub trait Listener {
     fn rested(&mut self) {}
 
     /// A function of the model printed something, or failed.
-    fn said(&mut self, said: &Said) {
+    fn said(&mut self, said: &FunctionOutput) {
         let _ = said;
     }
 
@@ -87,7 +89,7 @@ pub trait Listener {
 pub enum ChartTrouble {
     /// It could not be entered. The next event tries again.
     NotEntered,
-    /// It did not come to rest within [`limits::CHART_RUN`] turns. What it still had inside was dropped.
+    /// It did not come to rest within [`limits::CHART_RUN`] microsteps. What it still had inside was dropped.
     Runaway,
 }
 
@@ -133,7 +135,7 @@ pub struct Core<F = Nobody> {
     machine: Machine,
     batch: Vec<Raised>,
     functions: F,
-    said: Vec<Said>,
+    said: Vec<FunctionOutput>,
     /// When the model is to be given a turn although nothing happened.
     again: Option<Time>,
 }
@@ -142,7 +144,7 @@ pub struct Core<F = Nobody> {
 struct Collect<'a>(&'a mut Vec<Raised>);
 
 impl Hook for Collect<'_> {
-    const TURNS: bool = false;
+    const MICROSTEPS: bool = false;
     const WATCHES: bool = false;
 
     fn raised(&mut self, _: &Chart, raised: Raised) {
@@ -204,7 +206,7 @@ impl<F: Hook> Core<F> {
         }
         listener.delivers(event);
         let id = self.functions.event(&self.chart, event);
-        let at_once = if F::TURNS {
+        let at_once = if F::MICROSTEPS {
             AtOnce::No
         } else {
             self.machine.at_once(&self.chart, id, now, &mut Collect(&mut self.batch))
@@ -218,7 +220,7 @@ impl<F: Hook> Core<F> {
             return Delivered::Taken;
         }
         self.machine.send(id);
-        if matches!(self.settle(now, listener), TurnResult::Taken | TurnResult::Entered) {
+        if matches!(self.settle(now, listener), MicrostepResult::Taken | MicrostepResult::Entered) {
             Delivered::Taken
         } else {
             listener.unmatched(event);
@@ -234,7 +236,7 @@ impl<F: Hook> Core<F> {
     /// When [`tick`](Self::tick) is next needed if no event comes; none: not at all.
     pub fn next_deadline(&self) -> Option<Time> {
         let due = self.machine.next_deadline(&self.chart);
-        if F::TURNS { [due, self.again].into_iter().flatten().min() } else { due }
+        if F::MICROSTEPS { [due, self.again].into_iter().flatten().min() } else { due }
     }
 
     /// When an activity is to be resumed, or the model asked for events: what it wants at once waits a little, so that
@@ -247,9 +249,9 @@ impl<F: Hook> Core<F> {
         wants.then(|| now + limits::DOO_IDLE)
     }
 
-    /// Whether a turn left nothing to do.
-    fn is_idle(&self, step: TurnResult) -> bool {
-        step == TurnResult::Quiet { idle: true } && self.machine.queue().events().is_empty()
+    /// Whether a microstep left nothing to do.
+    fn is_idle(&self, step: MicrostepResult) -> bool {
+        step == MicrostepResult::Quiet { idle: true } && self.machine.queue().events().is_empty()
     }
 
     /// Hands on what the step raised.
@@ -261,16 +263,16 @@ impl<F: Hook> Core<F> {
     }
 
     /// Turns until nothing is left to do; answers what the first one did.
-    fn settle(&mut self, now: Time, listener: &mut (impl Listener + ?Sized)) -> TurnResult {
+    fn settle(&mut self, now: Time, listener: &mut (impl Listener + ?Sized)) -> MicrostepResult {
         let mut first = None;
         self.again = None;
         for _ in 0..limits::CHART_RUN {
             let mut collect = Collect(&mut self.batch);
             let mut hook = Watched { watcher: &mut collect, functions: &mut self.functions };
-            let step = self.machine.turn(&self.chart, now, &mut hook);
+            let step = self.machine.microstep(&self.chart, now, &mut hook);
             first = first.or(Some(step));
-            let goes_on = F::TURNS && self.is_idle(step) && self.functions.go_on();
-            if F::TURNS {
+            let goes_on = F::MICROSTEPS && self.is_idle(step) && self.functions.go_on();
+            if F::MICROSTEPS {
                 if let Some(grown) = self.machine.grown() {
                     listener.grown(grown);
                 }
@@ -278,27 +280,27 @@ impl<F: Hook> Core<F> {
                 self.said.drain(..).for_each(|said| listener.said(&said));
             }
             match step {
-                TurnResult::Taken | TurnResult::Entered => {
+                MicrostepResult::Taken | MicrostepResult::Entered => {
                     listener.moved(self.machine.chart(&self.chart), self.machine.active())
                 }
-                TurnResult::NotEntered => {
+                MicrostepResult::NotEntered => {
                     listener.trouble(&self.chart, ChartTrouble::NotEntered);
                     return step;
                 }
-                TurnResult::Unmatched | TurnResult::Quiet { .. } => (),
+                MicrostepResult::Unmatched | MicrostepResult::Quiet { .. } => (),
             }
             self.tell(listener);
             let rests = match step {
-                TurnResult::Taken | TurnResult::Entered => {
+                MicrostepResult::Taken | MicrostepResult::Entered => {
                     self.machine.rest::<Watched<'_, Collect<'_>, F>>(&self.chart)
                 }
-                // A time event that came due in an idle turn waits inside for the next one.
-                TurnResult::Quiet { .. } if goes_on || !self.machine.queue().events().is_empty() => false,
-                TurnResult::Quiet { idle } => {
-                    if F::TURNS {
+                // A time event that came due in an idle microstep waits inside for the next one.
+                MicrostepResult::Quiet { .. } if goes_on || !self.machine.queue().events().is_empty() => false,
+                MicrostepResult::Quiet { idle } => {
+                    if F::MICROSTEPS {
                         self.again = self.turn_after(idle, now);
                     }
-                    idle || F::TURNS
+                    idle || F::MICROSTEPS
                 }
                 _ => false,
             };
@@ -308,6 +310,6 @@ impl<F: Hook> Core<F> {
         }
         self.machine.drop_queue();
         listener.trouble(&self.chart, ChartTrouble::Runaway);
-        first.unwrap_or(TurnResult::Unmatched)
+        first.unwrap_or(MicrostepResult::Unmatched)
     }
 }

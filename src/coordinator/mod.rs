@@ -1,6 +1,6 @@
 //! Runs a statechart: events in, names out (semantics: *Coordinators*).
 //!
-//! A [`Coordinator`] is a thread of its own that takes events from its inbox, one at a time, and lets the chart react to
+//! A [`CoordinatorHandle`] is a thread of its own that takes events from its inbox, one at a time, and lets the chart react to
 //! each until it comes to rest; the names that a step raises go to a [`Listener`] as one batch. [`Core`] is the same
 //! without a thread, driven by calls.
 //!
@@ -13,5 +13,5 @@ mod inbox;
 mod thread;
 
 pub use self::core::{ChartTrouble, Core, Delivered, Listener, Tag};
-pub use inbox::{Class, Dropped, Incoming, Put, Refused};
-pub use thread::Coordinator;
+pub use inbox::{Class, Dropped, Incoming, NotAccepted, Put};
+pub use thread::CoordinatorHandle;

@@ -1,11 +1,11 @@
 //! The coordinator's own thread.
 
 use super::core::{ChartTrouble, Core, Listener};
-use super::inbox::{Class, Dropped, Inbox, Incoming, Put, Refused};
+use super::inbox::{Class, Dropped, Inbox, Incoming, NotAccepted, Put};
 use super::{Delivered, Tag};
 use crate::limits;
 use crate::model::names::EventName;
-use crate::statechart::{Chart, Hook, Nobody, NodeId, Printer, Raised, Said};
+use crate::statechart::{Chart, FunctionOutput, Hook, Nobody, NodeId, Printer, Raised};
 use crate::time::clock::panic_text;
 use crate::time::{Clock, Join, JoinError, Released, Signal, Time, lock};
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -15,7 +15,7 @@ use std::sync::{Arc, Mutex, OnceLock, TryLockError};
 /// A running coordinator. Cloning makes another handle of the same one; it ends when it is told to, not when the handles
 /// are gone.
 #[derive(Clone)]
-pub struct Coordinator {
+pub struct CoordinatorHandle {
     shared: Arc<CoordinatorShared>,
 }
 
@@ -47,7 +47,7 @@ struct Thread {
     id: Option<std::thread::ThreadId>,
 }
 
-impl Coordinator {
+impl CoordinatorHandle {
     /// Starts a thread that enters the chart, and then reacts to what is [delivered](Self::deliver).
     pub fn start(name: &str, chart: Arc<Chart>, clock: &Clock, listener: impl Listener + Send + 'static) -> Self {
         Self::start_with(name, chart, clock, listener, || Ok(Nobody))
@@ -95,10 +95,10 @@ impl Coordinator {
     /// is told of it. The next event of that class that is delivered takes that room.
     ///
     /// # Errors
-    /// [`Refused`]: there is none (counted), or the coordinator has been detached.
-    pub fn hold(&self, class: Class) -> Result<(), Refused> {
+    /// [`NotAccepted`]: there is none (counted), or the coordinator has been detached.
+    pub fn hold(&self, class: Class) -> Result<(), NotAccepted> {
         if self.is_detached() {
-            return Err(Refused::Detached);
+            return Err(NotAccepted::Detached);
         }
         lock(&self.shared.inbox).hold(class)
     }
@@ -111,10 +111,10 @@ impl Coordinator {
     /// Puts an event into the inbox. Never waits.
     ///
     /// # Errors
-    /// [`Refused`]: there is no room (counted), or the coordinator has been detached.
-    pub fn deliver(&self, incoming: Incoming) -> Result<Put, Refused> {
+    /// [`NotAccepted`]: there is no room (counted), or the coordinator has been detached.
+    pub fn deliver(&self, incoming: Incoming) -> Result<Put, NotAccepted> {
         if self.is_detached() {
-            return Err(Refused::Detached);
+            return Err(NotAccepted::Detached);
         }
         let put = lock(&self.shared.inbox).push(incoming)?;
         self.shared.bell.notify();
@@ -193,7 +193,7 @@ impl Coordinator {
     }
 }
 
-impl std::fmt::Debug for Coordinator {
+impl std::fmt::Debug for CoordinatorHandle {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Coordinator").field("leaf", &self.leaf()).field("detached", &self.is_detached()).finish()
     }
@@ -237,7 +237,7 @@ impl CoordinatorShared {
         let mut core = match open() {
             Ok(functions) => Core::with(self.chart.clone(), functions),
             Err(text) => {
-                listener.said(&Said { by: Printer::Err, text: text.clone() });
+                listener.said(&FunctionOutput { by: Printer::Err, text: text.clone() });
                 return Err(format!("its functions cannot be run: {text}"));
             }
         };
@@ -267,7 +267,7 @@ impl CoordinatorShared {
             });
             if worked {
                 self.lost.store(core.lost(), Ordering::Relaxed);
-                round.turn(&self.clock, now);
+                round.iterate(&self.clock, now);
             } else {
                 listener.rested();
                 self.bell.wait(core.next_deadline().unwrap_or(Time::NEVER));
@@ -298,20 +298,20 @@ impl CoordinatorShared {
 #[derive(Default)]
 struct Round {
     at: Time,
-    turns: u32,
+    iterations: u32,
 }
 
 impl Round {
     /// It reacted at `now`; when that was too much for a moment, time passes.
-    fn turn(&mut self, clock: &Clock, now: Time) {
+    fn iterate(&mut self, clock: &Clock, now: Time) {
         if !clock.is_simulated() {
             return;
         }
         if now != self.at {
-            *self = Self { at: now, turns: 0 };
+            *self = Self { at: now, iterations: 0 };
         }
-        self.turns = self.turns.saturating_add(1);
-        if self.turns > limits::MOMENT_TURNS {
+        self.iterations = self.iterations.saturating_add(1);
+        if self.iterations > limits::MOMENT_ITERATIONS {
             clock.sleep(limits::MOMENT_PAUSE);
             // Time that passes only here does not end the round.
             self.at = clock.now();
@@ -375,7 +375,7 @@ impl<L: Listener> Listener for Publisher<'_, L> {
         self.tell(Listener::rested);
     }
 
-    fn said(&mut self, said: &Said) {
+    fn said(&mut self, said: &FunctionOutput) {
         self.tell(|listener| listener.said(said));
     }
 

@@ -1,6 +1,6 @@
 //! The components of a system, their ports and connections.
 
-use super::picture::{Direction, Edge, Node, Picture, Subject, Tone};
+use super::diagram::{Diagram, DiagramEdge, DiagramNode, RankDirection, Subject, Tone};
 use super::text::short;
 use crate::model::monitor::{ConditionKind, MONITORS_TYPE, SignalKind};
 use crate::model::{
@@ -12,8 +12,8 @@ use std::collections::{BTreeMap, BTreeSet};
 /// What a system looks like: a box for each component with its type, its run state and those of its ports that are
 /// connected, written or watched; an edge for each connection, labelled with its policy where that is not `data`. A
 /// component that runs `monitors` has a dashed line from each port they watch, and a row for each of them with its events.
-pub fn components(title: &str, system: &Snapshot, catalogue: &Catalogue, monitors: &[Monitor]) -> Picture {
-    let mut picture = Picture::new(Subject::Components, Direction::Right, title);
+pub fn components(title: &str, system: &Snapshot, catalogue: &Catalogue, monitors: &[Monitor]) -> Diagram {
+    let mut diagram = Diagram::new(Subject::Components, RankDirection::Right, title);
     let mut used: BTreeSet<MemberRef> = BTreeSet::new();
     for (from, to) in system.connections.keys() {
         used.insert(*from);
@@ -35,9 +35,9 @@ pub fn components(title: &str, system: &Snapshot, catalogue: &Catalogue, monitor
     let mut tones: BTreeSet<RunState> = BTreeSet::new();
     let mut lines: Vec<(WatchedMember, ComponentName, usize)> = Vec::new();
     for (name, component) in &system.components {
-        let parent = subsystem(&mut picture, &mut groups, name.prefix());
+        let parent = subsystem(&mut diagram, &mut groups, name.prefix());
         let own = name.as_str().rsplit('/').next().unwrap_or(name.as_str());
-        let mut node = Node::new(name.as_str(), own);
+        let mut node = DiagramNode::new(name.as_str(), own);
         node.parent = parent;
         node.lines.push(component.ty.to_string());
         node.lines.push(match component.activity {
@@ -77,18 +77,18 @@ pub fn components(title: &str, system: &Snapshot, catalogue: &Catalogue, monitor
                 node.outs.push(format!("{}{off}{arrow}{}", monitor.name, events.join(", ")));
             }
         }
-        boxes.insert(*name, picture.add(node));
+        boxes.insert(*name, diagram.add(node));
     }
     for ((from, to), policy) in &system.connections {
         let (Some(a), Some(b)) = (boxes.get(&from.component), boxes.get(&to.component)) else { continue };
-        let mut edge = Edge::new(*a, *b);
+        let mut edge = DiagramEdge::new(*a, *b);
         edge.from_port = rows.get(from).map(|(_, row)| *row);
         edge.to_port = rows.get(to).map(|(_, row)| *row);
         if let Policy::Buffer(_) = policy {
             edge.label.push(policy.to_string());
             edge.dashed = true;
         }
-        picture.edges.push(edge);
+        diagram.edges.push(edge);
     }
     for (watched, by, row) in lines {
         let (component, port) = match watched {
@@ -96,18 +96,18 @@ pub fn components(title: &str, system: &Snapshot, catalogue: &Catalogue, monitor
             WatchedMember::Component(name) => (name, None),
         };
         let (Some(a), Some(b)) = (boxes.get(&component), boxes.get(&by)) else { continue };
-        let mut edge = Edge::new(*a, *b);
+        let mut edge = DiagramEdge::new(*a, *b);
         // An in-port is watched at its box: lines leave at the other side.
         edge.from_port = port.filter(|(direction, _)| *direction == PortDirection::Out).map(|(_, row)| *row);
         edge.to_port = Some(row);
         edge.dashed = true;
-        picture.edges.push(edge);
+        diagram.edges.push(edge);
     }
-    picture.legend = tones.into_iter().map(|state| (tone(state), state.to_string())).collect();
-    picture
+    diagram.legend = tones.into_iter().map(|state| (tone(state), state.to_string())).collect();
+    diagram
 }
 
-/// What a monitor looks at. Activities are in no picture of components.
+/// What a monitor looks at. Activities are in no diagram of components.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum WatchedMember {
     Port(MemberRef),
@@ -142,7 +142,7 @@ fn watches(monitor: &Monitor) -> BTreeSet<WatchedMember> {
 }
 
 /// The group of a subsystem's path, made where it is not there yet.
-fn subsystem<'a>(picture: &mut Picture, groups: &mut BTreeMap<&'a str, usize>, path: &'a str) -> Option<usize> {
+fn subsystem<'a>(diagram: &mut Diagram, groups: &mut BTreeMap<&'a str, usize>, path: &'a str) -> Option<usize> {
     if path.is_empty() {
         return None;
     }
@@ -150,11 +150,11 @@ fn subsystem<'a>(picture: &mut Picture, groups: &mut BTreeMap<&'a str, usize>, p
         return Some(*group);
     }
     let (outer, own) = path.rsplit_once('/').unwrap_or(("", path));
-    let parent = subsystem(picture, groups, outer);
-    let mut node = Node::new(path, own);
-    node.shape = super::picture::Shape::Group;
+    let parent = subsystem(diagram, groups, outer);
+    let mut node = DiagramNode::new(path, own);
+    node.shape = super::diagram::Shape::Group;
     node.parent = parent;
-    let group = picture.add(node);
+    let group = diagram.add(node);
     groups.insert(path, group);
     Some(group)
 }
@@ -174,7 +174,7 @@ mod tests {
     use crate::model::monitor::{Condition, Sampling};
     use crate::model::{ComponentSnapshot, ComponentType, EventName, Ident, PortType, ValueType};
 
-    /// A picture of the youBot's control loop, with everything a drawing can have.
+    /// A diagram of the youBot's control loop, with everything a drawing can have.
     pub(crate) fn youbot() -> (Snapshot, Catalogue) {
         let ident = |t: &str| Ident::new(t).unwrap();
         let mut catalogue = Catalogue::new();
@@ -245,10 +245,10 @@ mod tests {
     #[test]
     fn every_component_port_and_connection_is_drawn() {
         let (system, catalogue) = youbot();
-        let picture = components("youbot", &system, &catalogue, &[]);
-        assert_eq!(picture.edges.len(), system.connections.len());
-        assert!(picture.edges.iter().all(|e| e.from_port.is_some() && e.to_port.is_some()));
-        let svg = picture.svg();
+        let diagram = components("youbot", &system, &catalogue, &[]);
+        assert_eq!(diagram.edges.len(), system.connections.len());
+        assert!(diagram.edges.iter().all(|e| e.from_port.is_some() && e.to_port.is_some()));
+        let svg = diagram.svg();
         if let Ok(path) = std::env::var("DRAW_COMPONENTS") {
             std::fs::write(path, &svg).unwrap();
         }
@@ -256,8 +256,8 @@ mod tests {
             assert!(svg.contains(name.as_str().rsplit('/').next().unwrap()));
         }
         assert!(svg.contains("ext_ref_mode = true"));
-        assert!(picture.mermaid().contains("buffer(64)"));
-        assert!(picture.dot().contains("subgraph"));
+        assert!(diagram.mermaid().contains("buffer(64)"));
+        assert!(diagram.dot().contains("subgraph"));
     }
 
     #[test]
@@ -295,22 +295,22 @@ mod tests {
             activity: None,
         };
         system.components.insert(ComponentName::new("Monitors").unwrap(), component);
-        let picture = components("youbot", &system, &catalogue, &monitors);
-        let at = picture.nodes.iter().position(|node| node.title == "Monitors").unwrap();
-        assert_eq!(picture.nodes[at].ins, ["Dynamics.f_des", "Link_Rx.link_stats", "Base_Ctrl"]);
-        assert_eq!(picture.nodes[at].outs, ["lost → e_lost", "both (off)", "inward"]);
-        let lines: Vec<&Edge> = picture.edges.iter().filter(|edge| edge.to == at).collect();
+        let diagram = components("youbot", &system, &catalogue, &monitors);
+        let at = diagram.nodes.iter().position(|node| node.title == "Monitors").unwrap();
+        assert_eq!(diagram.nodes[at].ins, ["Dynamics.f_des", "Link_Rx.link_stats", "Base_Ctrl"]);
+        assert_eq!(diagram.nodes[at].outs, ["lost → e_lost", "both (off)", "inward"]);
+        let lines: Vec<&DiagramEdge> = diagram.edges.iter().filter(|edge| edge.to == at).collect();
         assert!(lines.len() == 3 && lines.iter().all(|edge| edge.dashed), "{lines:?}");
         let from = |row: usize| {
             let edge = lines.iter().find(|edge| edge.to_port == Some(row)).unwrap();
-            (picture.nodes[edge.from].title.as_str(), edge.from_port.map(|p| picture.nodes[edge.from].outs[p].as_str()))
+            (diagram.nodes[edge.from].title.as_str(), edge.from_port.map(|p| diagram.nodes[edge.from].outs[p].as_str()))
         };
         assert_eq!(from(0), ("Dynamics", None), "an in-port has no row on the side where lines leave");
         assert_eq!(from(1), ("Link_Rx", Some("link_stats")));
         assert_eq!(from(2), ("Base_Ctrl", None));
-        for text in [picture.svg(), picture.dot(), picture.mermaid()] {
+        for text in [diagram.svg(), diagram.dot(), diagram.mermaid()] {
             assert!(text.contains("e_lost") && text.contains("(off)") && text.contains("Link_Rx.link_stats"), "{text}");
         }
-        assert!(picture.svg().contains("stroke-dasharray") && picture.mermaid().contains("-.->"));
+        assert!(diagram.svg().contains("stroke-dasharray") && diagram.mermaid().contains("-.->"));
     }
 }

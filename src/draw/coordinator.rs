@@ -1,9 +1,9 @@
 //! A coordinator: states inside states, with what they ask for; transitions with what triggers them.
 
-use super::picture::{Direction, Edge, Node, Picture, Shape, Subject, Tone};
+use super::diagram::{Diagram, DiagramEdge, DiagramNode, RankDirection, Shape, Subject, Tone};
 use super::text::short;
 use crate::model::Statechart;
-use crate::model::statechart::{Action, INITIAL, Node as Child, ROOT, State, Transition, Trigger};
+use crate::model::statechart::{Action, ChartNode as Child, ChartTransition, INITIAL, ROOT, State, Trigger};
 use std::collections::BTreeMap;
 
 /// Lines of a transition's label before the rest is only counted.
@@ -18,44 +18,44 @@ const ANY: &str = "any event";
 /// References are followed as far as they lead to something; a transition that leads nowhere is not drawn (`check` says
 /// so). Transitions with the same ends are one edge with the events of all; one without events says *any event*, but for the
 /// only way between a connector and a node. A priority number other than 0 stands in parentheses.
-pub fn coordinator(title: &str, chart: &Statechart, active: &[String]) -> Picture {
+pub fn coordinator(title: &str, chart: &Statechart, active: &[String]) -> Diagram {
     let title = if chart.is_pure() { title.to_owned() } else { format!("{title} ({UNVERIFIED})") };
-    let mut picture = Picture::new(Subject::Statechart, Direction::Down, &title);
-    draw(&mut picture, chart, active, "", None);
-    picture
+    let mut diagram = Diagram::new(Subject::Statechart, RankDirection::Down, &title);
+    draw(&mut diagram, chart, active, "", None);
+    diagram
 }
 
 /// What stands beside the name of a coordinator with functions.
 const UNVERIFIED: &str = "functions are not verified";
 
 /// Several coordinators side by side, each in a box with its name: name, statechart and active states of each.
-pub fn coordinators(title: &str, all: &[(&str, &Statechart, Vec<String>)]) -> Picture {
-    let mut picture = Picture::new(Subject::Statechart, Direction::Down, title);
+pub fn coordinators(title: &str, all: &[(&str, &Statechart, Vec<String>)]) -> Diagram {
+    let mut diagram = Diagram::new(Subject::Statechart, RankDirection::Down, title);
     for (name, chart, active) in all {
-        let mut group = Node::new(*name, *name);
+        let mut group = DiagramNode::new(*name, *name);
         group.shape = Shape::Group;
         if !chart.is_pure() {
             group.lines.push(UNVERIFIED.to_owned());
         }
-        let group = picture.add(group);
-        draw(&mut picture, chart, active, &format!("{name}:"), Some(group));
+        let group = diagram.add(group);
+        draw(&mut diagram, chart, active, &format!("{name}:"), Some(group));
     }
-    picture
+    diagram
 }
 
 /// One coordinator inside `parent`; the names of its nodes begin with `prefix`.
-fn draw(picture: &mut Picture, chart: &Statechart, active: &[String], prefix: &str, parent: Option<usize>) {
-    let first = picture.edges.len();
-    let mut drawing = Drawing { picture, index: BTreeMap::new(), active, prefix };
+fn draw(diagram: &mut Diagram, chart: &Statechart, active: &[String], prefix: &str, parent: Option<usize>) {
+    let first = diagram.edges.len();
+    let mut drawing = Drawing { diagram, index: BTreeMap::new(), active, prefix };
     drawing.state_content(&chart.root, ROOT, parent);
     drawing.transitions(&chart.root, ROOT);
-    for edge in &mut picture.edges[first..] {
+    for edge in &mut diagram.edges[first..] {
         edge.label = fold(&edge.label);
     }
 }
 
 struct Drawing<'a> {
-    picture: &'a mut Picture,
+    diagram: &'a mut Diagram,
     /// Nodes by their full name; the root has none.
     index: BTreeMap<String, usize>,
     active: &'a [String],
@@ -74,14 +74,14 @@ impl Drawing<'_> {
             match child {
                 Child::Connector(c) if c.name.as_str() == INITIAL => self.dot(&name, parent),
                 Child::Connector(c) => {
-                    let mut node = Node::new(self.id(&name), c.name.as_str());
+                    let mut node = DiagramNode::new(self.id(&name), c.name.as_str());
                     node.shape = Shape::Connector;
                     node.parent = parent;
-                    let at = self.picture.add(node);
+                    let at = self.diagram.add(node);
                     self.index.insert(name, at);
                 }
                 Child::State(inner) => {
-                    let mut node = Node::new(self.id(&name), inner.name.as_str());
+                    let mut node = DiagramNode::new(self.id(&name), inner.name.as_str());
                     node.parent = parent;
                     node.shape = if inner.children.is_empty() && inner.transitions.is_empty() {
                         Shape::Box
@@ -92,7 +92,7 @@ impl Drawing<'_> {
                     if self.active.contains(&name) {
                         node.tone = Tone::Active;
                     }
-                    let at = self.picture.add(node);
+                    let at = self.diagram.add(node);
                     self.index.insert(name.clone(), at);
                     self.state_content(inner, &name, Some(at));
                 }
@@ -106,10 +106,10 @@ impl Drawing<'_> {
     }
 
     fn dot(&mut self, name: &str, parent: Option<usize>) {
-        let mut node = Node::new(self.id(name), INITIAL);
+        let mut node = DiagramNode::new(self.id(name), INITIAL);
         node.shape = Shape::Dot;
         node.parent = parent;
-        let at = self.picture.add(node);
+        let at = self.diagram.add(node);
         self.index.insert(name.to_owned(), at);
     }
 
@@ -118,9 +118,9 @@ impl Drawing<'_> {
             let ends = (transition.src.as_ref(), transition.tgt.as_ref());
             let (Some((src, _)), Some((tgt, _))) = ends else { continue };
             let (Some(from), Some(to)) = (self.find(fqn, src), self.find(fqn, tgt)) else { continue };
-            let connector = matches!(self.picture.nodes[from].shape, Shape::Dot | Shape::Connector);
+            let connector = matches!(self.diagram.nodes[from].shape, Shape::Dot | Shape::Connector);
             let mut label = transition_lines(transition, connector);
-            if let Some(edge) = self.picture.edges.iter_mut().find(|e| e.from == from && e.to == to) {
+            if let Some(edge) = self.diagram.edges.iter_mut().find(|e| e.from == from && e.to == to) {
                 // Beside another one, what needs no event must not vanish.
                 if edge.label.is_empty() != label.is_empty() {
                     let empty = if label.is_empty() { &mut label } else { &mut edge.label };
@@ -128,9 +128,9 @@ impl Drawing<'_> {
                 }
                 edge.label.extend(label);
             } else {
-                let mut edge = Edge::new(from, to);
+                let mut edge = DiagramEdge::new(from, to);
                 edge.label = label;
-                self.picture.edges.push(edge);
+                self.diagram.edges.push(edge);
             }
         }
         for child in &state.children {
@@ -187,7 +187,7 @@ fn state_lines(state: &State) -> Vec<String> {
 
 /// Each event of a transition, the last with its priority and what the transition raises. Of one out of a connector nothing is
 /// said where it needs no event.
-fn transition_lines(transition: &Transition, connector: bool) -> Vec<String> {
+fn transition_lines(transition: &ChartTransition, connector: bool) -> Vec<String> {
     let mut lines: Vec<String> = transition
         .events
         .iter()
@@ -251,7 +251,7 @@ mod tests {
         state.transitions = transitions
             .iter()
             .map(|(src, tgt, events)| {
-                Transition::new(src, tgt, events.iter().map(|e| Trigger::Event(EventName::new(e).unwrap())))
+                ChartTransition::new(src, tgt, events.iter().map(|e| Trigger::Event(EventName::new(e).unwrap())))
             })
             .collect();
         state
@@ -309,16 +309,16 @@ mod tests {
             ],
         );
         let chart = Statechart::new(root);
-        let picture = coordinator("demo", &chart, &["root.sync".to_owned(), "root.sync.copying".to_owned()]);
-        assert_eq!(picture.edges.len(), 15);
-        let svg = picture.svg();
+        let diagram = coordinator("demo", &chart, &["root.sync".to_owned(), "root.sync.copying".to_owned()]);
+        assert_eq!(diagram.edges.len(), 15);
+        let svg = diagram.svg();
         if let Ok(path) = std::env::var("DRAW_COORDINATOR") {
             std::fs::write(path, &svg).unwrap();
         }
         assert!(svg.contains("entry / enable_copying"));
-        assert_eq!(picture.nodes.iter().filter(|n| n.tone == Tone::Active).count(), 2);
-        assert!(picture.mermaid().contains("[*] -->"));
-        assert!(picture.dot().contains("cluster_"));
+        assert_eq!(diagram.nodes.iter().filter(|n| n.tone == Tone::Active).count(), 2);
+        assert!(diagram.mermaid().contains("[*] -->"));
+        assert!(diagram.dot().contains("cluster_"));
     }
 
     #[test]
@@ -338,16 +338,16 @@ mod tests {
         );
         root.children.push(Child::Connector(crate::model::statechart::Connector::new(Ident::new("fork").unwrap())));
         root.transitions[3].pn = 2.0;
-        let picture = coordinator("k", &Statechart::new(root), &[]);
+        let diagram = coordinator("k", &Statechart::new(root), &[]);
         let label = |from: &str, to: &str| {
-            let named = |at: usize| picture.nodes[at].title.as_str();
-            let edge = picture.edges.iter().find(|e| (named(e.from), named(e.to)) == (from, to)).expect("drawn");
+            let named = |at: usize| diagram.nodes[at].title.as_str();
+            let edge = diagram.edges.iter().find(|e| (named(e.from), named(e.to)) == (from, to)).expect("drawn");
             edge.label.join("|")
         };
         assert_eq!(label("on", "idle"), "any event, e_stop (2)");
         assert_eq!(label("fork", "on"), "any event, e_more");
         assert_eq!([label("initial", "idle"), label("fork", "idle")], ["", ""]);
-        for text in [picture.svg(), picture.dot(), picture.mermaid()] {
+        for text in [diagram.svg(), diagram.dot(), diagram.mermaid()] {
             assert!(text.contains("any event, e_stop (2)"), "{text}");
         }
     }

@@ -1,24 +1,24 @@
-//! A picture in Graphviz' language; groups become clusters, ports record fields.
+//! A diagram in Graphviz' language; groups become clusters, ports record fields.
 
-use super::picture::{Direction, Node, Picture, Shape, Tone};
+use super::diagram::{Diagram, DiagramNode, RankDirection, Shape, Tone};
 use std::fmt::Write as _;
 
-pub(super) fn write(picture: &Picture) -> String {
+pub(super) fn write(diagram: &Diagram) -> String {
     let mut out = String::new();
-    let rank = match picture.direction {
-        Direction::Right => "LR",
-        Direction::Down => "TB",
+    let rank = match diagram.direction {
+        RankDirection::Right => "LR",
+        RankDirection::Down => "TB",
     };
-    let _ = writeln!(out, "digraph {} {{", quoted(&picture.title));
+    let _ = writeln!(out, "digraph {} {{", quoted(&diagram.title));
     let _ = writeln!(
         out,
         "  rankdir={rank}; compound=true; fontname=\"Helvetica\"; label={}; labelloc=t;",
-        quoted(&picture.title)
+        quoted(&diagram.title)
     );
     out.push_str("  node [fontname=\"Helvetica\", fontsize=11, style=\"rounded,filled\", fillcolor=white];\n");
     out.push_str("  edge [fontname=\"Helvetica\", fontsize=10];\n");
-    level(&mut out, picture, None, 1);
-    for edge in &picture.edges {
+    level(&mut out, diagram, None, 1);
+    for edge in &diagram.edges {
         let mut attributes = Vec::new();
         if !edge.label.is_empty() {
             attributes.push(format!("label={}", quoted(&edge.label.join("\n"))));
@@ -26,8 +26,8 @@ pub(super) fn write(picture: &Picture) -> String {
         if edge.dashed {
             attributes.push("style=dashed".to_owned());
         }
-        let (from, tail) = anchor(picture, edge.from);
-        let (to, head) = anchor(picture, edge.to);
+        let (from, tail) = anchor(diagram, edge.from);
+        let (to, head) = anchor(diagram, edge.to);
         if let Some(cluster) = tail {
             attributes.push(format!("ltail=\"cluster_{cluster}\""));
         }
@@ -43,21 +43,21 @@ pub(super) fn write(picture: &Picture) -> String {
 }
 
 /// The node an edge of `index` is tied to: itself, or for a cluster something in it and the cluster.
-fn anchor(picture: &Picture, index: usize) -> (usize, Option<usize>) {
+fn anchor(diagram: &Diagram, index: usize) -> (usize, Option<usize>) {
     let mut at = index;
-    while picture.nodes[at].shape == Shape::Group
-        && let Some(child) = picture.children(Some(at)).next()
+    while diagram.nodes[at].shape == Shape::Group
+        && let Some(child) = diagram.children(Some(at)).next()
     {
         at = child;
     }
     (at, (at != index).then_some(index))
 }
 
-fn level(out: &mut String, picture: &Picture, group: Option<usize>, depth: usize) {
+fn level(out: &mut String, diagram: &Diagram, group: Option<usize>, depth: usize) {
     let indent = "  ".repeat(depth);
-    for index in picture.children(group) {
-        let node = &picture.nodes[index];
-        if node.shape == Shape::Group && picture.children(Some(index)).next().is_some() {
+    for index in diagram.children(group) {
+        let node = &diagram.nodes[index];
+        if node.shape == Shape::Group && diagram.children(Some(index)).next().is_some() {
             let _ = writeln!(out, "{indent}subgraph \"cluster_{index}\" {{");
             let _ = writeln!(
                 out,
@@ -65,7 +65,7 @@ fn level(out: &mut String, picture: &Picture, group: Option<usize>, depth: usize
                 quoted(&heading(node)),
                 fill(node.tone, depth)
             );
-            level(out, picture, Some(index), depth + 1);
+            level(out, diagram, Some(index), depth + 1);
             let _ = writeln!(out, "{indent}}}");
             continue;
         }
@@ -97,7 +97,7 @@ fn level(out: &mut String, picture: &Picture, group: Option<usize>, depth: usize
     }
 }
 
-fn heading(node: &Node) -> String {
+fn heading(node: &DiagramNode) -> String {
     std::iter::once(&node.title).chain(&node.lines).cloned().collect::<Vec<_>>().join("\n")
 }
 

@@ -1,23 +1,23 @@
-//! A picture in Mermaid's language: statecharts as `stateDiagram-v2`, everything else as a flowchart.
+//! A diagram in Mermaid's language: statecharts as `stateDiagram-v2`, everything else as a flowchart.
 
-use super::picture::{Direction, Picture, Shape, Subject, Tone};
+use super::diagram::{Diagram, RankDirection, Shape, Subject, Tone};
 use std::fmt::Write as _;
 
-pub(super) fn write(picture: &Picture) -> String {
-    if picture.subject == Subject::Statechart { statechart(picture) } else { flowchart(picture) }
+pub(super) fn write(diagram: &Diagram) -> String {
+    if diagram.subject == Subject::Statechart { statechart(diagram) } else { flowchart(diagram) }
 }
 
-fn flowchart(picture: &Picture) -> String {
-    let mut out = format!("---\ntitle: {}\n---\n", title(&picture.title));
-    out.push_str(match picture.direction {
-        Direction::Right => "flowchart LR\n",
-        Direction::Down => "flowchart TB\n",
+fn flowchart(diagram: &Diagram) -> String {
+    let mut out = format!("---\ntitle: {}\n---\n", title(&diagram.title));
+    out.push_str(match diagram.direction {
+        RankDirection::Right => "flowchart LR\n",
+        RankDirection::Down => "flowchart TB\n",
     });
-    flow_level(&mut out, picture, None, 1);
-    for edge in &picture.edges {
+    flow_level(&mut out, diagram, None, 1);
+    for edge in &diagram.edges {
         let mut label = edge.label.clone();
-        let from_port = edge.from_port.and_then(|p| picture.nodes[edge.from].outs.get(p));
-        let to_port = edge.to_port.and_then(|p| picture.nodes[edge.to].ins.get(p));
+        let from_port = edge.from_port.and_then(|p| diagram.nodes[edge.from].outs.get(p));
+        let to_port = edge.to_port.and_then(|p| diagram.nodes[edge.to].ins.get(p));
         if let (Some(from), Some(to)) = (from_port, to_port) {
             label.insert(0, if from == to { from.clone() } else { format!("{from} → {to}") });
         }
@@ -28,7 +28,7 @@ fn flowchart(picture: &Picture) -> String {
             let _ = writeln!(out, "  n{} {arrow}|\"{}\"| n{}", edge.from, plain(&label.join("\n")), edge.to);
         }
     }
-    for (i, node) in picture.nodes.iter().enumerate() {
+    for (i, node) in diagram.nodes.iter().enumerate() {
         if let Some(style) = style(node.tone) {
             let _ = writeln!(out, "  style n{i} {style}");
         }
@@ -37,10 +37,10 @@ fn flowchart(picture: &Picture) -> String {
 }
 
 /// Rows of a box that no edge ends at. Those of edges stand on the edges: a box has no rows here.
-fn free_rows(picture: &Picture, index: usize) -> impl Iterator<Item = &String> {
-    let node = &picture.nodes[index];
+fn free_rows(diagram: &Diagram, index: usize) -> impl Iterator<Item = &String> {
+    let node = &diagram.nodes[index];
     let taken = |row: usize, out: bool| {
-        picture.edges.iter().any(|edge| match out {
+        diagram.edges.iter().any(|edge| match out {
             true => edge.from == index && edge.from_port == Some(row),
             false => edge.to == index && edge.to_port == Some(row),
         })
@@ -50,15 +50,15 @@ fn free_rows(picture: &Picture, index: usize) -> impl Iterator<Item = &String> {
     ins.into_iter().map(|row| &node.ins[row]).chain(outs.into_iter().map(|row| &node.outs[row]))
 }
 
-fn flow_level(out: &mut String, picture: &Picture, group: Option<usize>, depth: usize) {
+fn flow_level(out: &mut String, diagram: &Diagram, group: Option<usize>, depth: usize) {
     let indent = "  ".repeat(depth);
-    for index in picture.children(group) {
-        let node = &picture.nodes[index];
-        let lines = std::iter::once(&node.title).chain(&node.lines).chain(free_rows(picture, index));
+    for index in diagram.children(group) {
+        let node = &diagram.nodes[index];
+        let lines = std::iter::once(&node.title).chain(&node.lines).chain(free_rows(diagram, index));
         let text = lines.map(|l| plain(l)).collect::<Vec<_>>().join("<br/>");
-        if node.shape == Shape::Group && picture.children(Some(index)).next().is_some() {
+        if node.shape == Shape::Group && diagram.children(Some(index)).next().is_some() {
             let _ = writeln!(out, "{indent}subgraph n{index} [\"{text}\"]");
-            flow_level(out, picture, Some(index), depth + 1);
+            flow_level(out, diagram, Some(index), depth + 1);
             let _ = writeln!(out, "{indent}end");
         } else {
             let _ = writeln!(out, "{indent}n{index}[\"{text}\"]");
@@ -66,11 +66,11 @@ fn flow_level(out: &mut String, picture: &Picture, group: Option<usize>, depth: 
     }
 }
 
-fn statechart(picture: &Picture) -> String {
-    let mut out = format!("---\ntitle: {}\n---\nstateDiagram-v2\n", title(&picture.title));
-    state_level(&mut out, picture, None, 1);
+fn statechart(diagram: &Diagram) -> String {
+    let mut out = format!("---\ntitle: {}\n---\nstateDiagram-v2\n", title(&diagram.title));
+    state_level(&mut out, diagram, None, 1);
     let mut active = Vec::new();
-    for (i, node) in picture.nodes.iter().enumerate() {
+    for (i, node) in diagram.nodes.iter().enumerate() {
         if node.tone == Tone::Active {
             active.push(format!("n{i}"));
         }
@@ -82,10 +82,10 @@ fn statechart(picture: &Picture) -> String {
     out
 }
 
-fn state_level(out: &mut String, picture: &Picture, group: Option<usize>, depth: usize) {
+fn state_level(out: &mut String, diagram: &Diagram, group: Option<usize>, depth: usize) {
     let indent = "  ".repeat(depth);
-    for index in picture.children(group) {
-        let node = &picture.nodes[index];
+    for index in diagram.children(group) {
+        let node = &diagram.nodes[index];
         match node.shape {
             Shape::Dot => continue,
             Shape::Connector => {
@@ -93,9 +93,9 @@ fn state_level(out: &mut String, picture: &Picture, group: Option<usize>, depth:
             }
             Shape::Box | Shape::Group => {
                 let _ = writeln!(out, "{indent}state \"{}\" as n{index}", plain(&node.title));
-                if picture.children(Some(index)).next().is_some() {
+                if diagram.children(Some(index)).next().is_some() {
                     let _ = writeln!(out, "{indent}state n{index} {{");
-                    state_level(out, picture, Some(index), depth + 1);
+                    state_level(out, diagram, Some(index), depth + 1);
                     let _ = writeln!(out, "{indent}}}");
                 }
                 for line in &node.lines {
@@ -105,8 +105,8 @@ fn state_level(out: &mut String, picture: &Picture, group: Option<usize>, depth:
         }
     }
     // A transition stands in the innermost state around both its ends, where Mermaid wants `[*]` to be.
-    for edge in picture.edges.iter().filter(|e| scope(picture, e.from, e.to) == group) {
-        let name = |node: usize| match picture.nodes[node].shape {
+    for edge in diagram.edges.iter().filter(|e| scope(diagram, e.from, e.to) == group) {
+        let name = |node: usize| match diagram.nodes[node].shape {
             Shape::Dot => "[*]".to_owned(),
             _ => format!("n{node}"),
         };
@@ -120,13 +120,13 @@ fn state_level(out: &mut String, picture: &Picture, group: Option<usize>, depth:
 }
 
 /// The innermost group around two nodes (not one of them).
-fn scope(picture: &Picture, a: usize, b: usize) -> Option<usize> {
+fn scope(diagram: &Diagram, a: usize, b: usize) -> Option<usize> {
     let chain = |node: usize| {
         let mut chain = Vec::new();
-        let mut at = picture.nodes[node].parent;
+        let mut at = diagram.nodes[node].parent;
         while let Some(group) = at {
             chain.push(group);
-            at = picture.nodes[group].parent;
+            at = diagram.nodes[group].parent;
         }
         chain
     };

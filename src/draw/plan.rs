@@ -1,59 +1,59 @@
 //! Plans: one box a configuration, the stages as lanes in it, each step coloured by how far it can be undone.
 
-use super::picture::{Direction, Edge, Node, Picture, Shape, Subject, Tone};
+use super::diagram::{Diagram, DiagramEdge, DiagramNode, RankDirection, Shape, Subject, Tone};
 use super::text::short;
 use crate::plan::{PlanStage, PlannedStep};
 use crate::system::Reversibility;
 use std::collections::BTreeMap;
 
 /// Plans up to this many stand in a row, joined by arrows; more are numbered and stand one below the other, or the
-/// picture would be a ribbon.
+/// diagram would be a ribbon.
 const ROW: usize = 3;
 
 /// What plans look like that are carried out one after the other, each with a heading.
-pub fn plan(title: &str, plans: &[(String, Vec<PlannedStep>)]) -> Picture {
-    let mut picture = Picture::new(Subject::Plan, Direction::Right, title);
+pub fn plan(title: &str, plans: &[(String, Vec<PlannedStep>)]) -> Diagram {
+    let mut diagram = Diagram::new(Subject::Plan, RankDirection::Right, title);
     let mut before: Option<usize> = None;
     let row = plans.len() <= ROW;
     for (i, (heading, steps)) in plans.iter().enumerate() {
         let heading = if row { heading.clone() } else { format!("{}. {heading}", i + 1) };
-        let mut group = Node::new(format!("plan{}", picture.nodes.len()), heading);
+        let mut group = DiagramNode::new(format!("plan{}", diagram.nodes.len()), heading);
         group.shape = Shape::Group;
         if steps.is_empty() {
             group.lines.push("nothing to do".to_owned());
         }
-        let group = picture.add(group);
+        let group = diagram.add(group);
         if let Some(before) = before.filter(|_| row) {
-            picture.edges.push(Edge::new(before, group));
+            diagram.edges.push(DiagramEdge::new(before, group));
         }
         before = Some(group);
-        lanes(&mut picture, group, steps);
+        lanes(&mut diagram, group, steps);
     }
-    picture.legend = vec![
+    diagram.legend = vec![
         (Tone::Good, "exact: its inverse restores what was".to_owned()),
         (Tone::Care, "compensated: another call makes good for it".to_owned()),
         (Tone::Bad, "irreversible".to_owned()),
     ];
-    picture
+    diagram
 }
 
-fn lanes(picture: &mut Picture, group: usize, steps: &[PlannedStep]) {
+fn lanes(diagram: &mut Diagram, group: usize, steps: &[PlannedStep]) {
     let mut lanes: BTreeMap<u32, usize> = BTreeMap::new();
     let mut nodes: BTreeMap<u32, usize> = BTreeMap::new();
     let mut last: Option<usize> = None;
     for step in steps {
         // A lane for each barrier; lanes are named after the stage they belong to.
         let lane = *lanes.entry(step.wave).or_insert_with(|| {
-            let mut lane = Node::new(format!("lane{}", picture.nodes.len()), stage(step.stage));
+            let mut lane = DiagramNode::new(format!("lane{}", diagram.nodes.len()), stage(step.stage));
             lane.shape = Shape::Group;
             lane.parent = Some(group);
-            let lane = picture.add(lane);
+            let lane = diagram.add(lane);
             if let Some(last) = last.replace(lane) {
-                picture.edges.push(Edge::new(last, lane));
+                diagram.edges.push(DiagramEdge::new(last, lane));
             }
             lane
         });
-        let mut node = Node::new(format!("step{}", picture.nodes.len()), short(&step.step.to_string(), 46));
+        let mut node = DiagramNode::new(format!("step{}", diagram.nodes.len()), short(&step.step.to_string(), 46));
         node.parent = Some(lane);
         node.tone = match step.reversibility {
             Reversibility::Exact => Tone::Good,
@@ -67,10 +67,10 @@ fn lanes(picture: &mut Picture, group: usize, steps: &[PlannedStep]) {
             let moving = if step.undo_moves { " (moves)" } else { "" };
             node.lines.push(short(&format!("undo: {}", undo.join("; ")), 54 - moving.len()) + moving);
         }
-        nodes.insert(step.id, picture.add(node));
+        nodes.insert(step.id, diagram.add(node));
         for after in &step.after {
             if let (Some(from), Some(to)) = (nodes.get(after), nodes.get(&step.id)) {
-                picture.edges.push(Edge::new(*from, *to));
+                diagram.edges.push(DiagramEdge::new(*from, *to));
             }
         }
     }

@@ -1,7 +1,7 @@
-//! A picture as SVG: no script, no font of its own, no outside reference; readable on a light background.
+//! A diagram as SVG: no script, no font of its own, no outside reference; readable on a light background.
 
+use super::diagram::{Diagram, DiagramNode, RankDirection, Shape, Tone};
 use super::layout::{LINE, Layout, LineRun, Rect, Route, SMALL, TITLE, header, layout};
-use super::picture::{Direction, Node, Picture, Shape, Tone};
 use super::text::{width, xml};
 use std::fmt::Write as _;
 
@@ -24,12 +24,12 @@ fn group_fill(depth: usize) -> &'static str {
     ["#f6f8fb", "#edf1f7", "#e4eaf3", "#dbe3ee", "#d2dcea"][depth.min(4)]
 }
 
-pub(super) fn write(picture: &Picture) -> String {
-    let Layout { nodes, routes, size } = layout(picture);
-    let heading = if picture.title.is_empty() { 0.0 } else { 30.0 };
-    let legend = if picture.legend.is_empty() { 0.0 } else { 30.0 };
-    let legend_width: f64 = picture.legend.iter().map(|(_, t)| width(t, SMALL) + 40.0).sum();
-    let w = size.0.max(width(&picture.title, 16.0) * 1.1).max(legend_width) + 2.0 * MARGIN;
+pub(super) fn write(diagram: &Diagram) -> String {
+    let Layout { nodes, routes, size } = layout(diagram);
+    let heading = if diagram.title.is_empty() { 0.0 } else { 30.0 };
+    let legend = if diagram.legend.is_empty() { 0.0 } else { 30.0 };
+    let legend_width: f64 = diagram.legend.iter().map(|(_, t)| width(t, SMALL) + 40.0).sum();
+    let w = size.0.max(width(&diagram.title, 16.0) * 1.1).max(legend_width) + 2.0 * MARGIN;
     let h = size.1 + 2.0 * MARGIN + heading + legend;
     let mut out = String::new();
     let _ = writeln!(
@@ -37,7 +37,7 @@ pub(super) fn write(picture: &Picture) -> String {
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{w:.0}\" height=\"{h:.0}\" viewBox=\"0 0 {w:.0} {h:.0}\" \
          font-family=\"'DejaVu Sans', Verdana, Helvetica, Arial, sans-serif\" font-size=\"{SMALL}\">"
     );
-    let _ = writeln!(out, "<title>{}</title>", xml(&picture.title));
+    let _ = writeln!(out, "<title>{}</title>", xml(&diagram.title));
     let _ = writeln!(
         out,
         "<defs><marker id=\"arrow\" viewBox=\"0 0 10 10\" refX=\"9\" refY=\"5\" markerWidth=\"7\" markerHeight=\"7\" \
@@ -49,43 +49,43 @@ pub(super) fn write(picture: &Picture) -> String {
             out,
             "<text x=\"{MARGIN}\" y=\"{}\" font-size=\"16\" font-weight=\"bold\" fill=\"#1c2733\">{}</text>",
             MARGIN + 10.0,
-            xml(&picture.title)
+            xml(&diagram.title)
         );
     }
     let _ = writeln!(out, "<g transform=\"translate({MARGIN},{})\">", MARGIN + heading);
-    let mut depth = vec![0usize; picture.nodes.len()];
-    for (i, node) in picture.nodes.iter().enumerate() {
+    let mut depth = vec![0usize; diagram.nodes.len()];
+    for (i, node) in diagram.nodes.iter().enumerate() {
         depth[i] = node.parent.map_or(0, |p| depth[p] + 1);
         if node.shape == Shape::Group {
-            draw_node(&mut out, picture, i, nodes[i], depth[i]);
+            draw_node(&mut out, diagram, i, nodes[i], depth[i]);
         }
     }
-    for (edge, route) in picture.edges.iter().zip(&routes) {
+    for (edge, route) in diagram.edges.iter().zip(&routes) {
         let dash = if edge.dashed { " stroke-dasharray=\"5 4\"" } else { "" };
         let _ = writeln!(
             out,
             "<path d=\"{}\" fill=\"none\" stroke=\"#44525f\" stroke-width=\"1.3\"{dash} marker-end=\"url(#arrow)\"/>",
-            path(route, picture.direction)
+            path(route, diagram.direction)
         );
     }
-    for (i, node) in picture.nodes.iter().enumerate() {
+    for (i, node) in diagram.nodes.iter().enumerate() {
         if node.shape == Shape::Group {
             draw_heading(&mut out, node, nodes[i], Some(group_colour(node, depth[i])));
         } else {
-            draw_node(&mut out, picture, i, nodes[i], depth[i]);
+            draw_node(&mut out, diagram, i, nodes[i], depth[i]);
             if node.shape != Shape::Dot {
                 draw_heading(&mut out, node, nodes[i], None);
             }
         }
     }
-    for (edge, route) in picture.edges.iter().zip(&routes) {
+    for (edge, route) in diagram.edges.iter().zip(&routes) {
         if let Some(rect) = route.label.filter(|_| !edge.label.is_empty()) {
             draw_label(&mut out, &edge.label, rect, route.looped.is_some());
         }
     }
     out.push_str("</g>\n");
     let mut x = MARGIN;
-    for (tone, meaning) in &picture.legend {
+    for (tone, meaning) in &diagram.legend {
         let (fill, stroke, text) = colours(*tone);
         let y = h - MARGIN - 6.0;
         let _ = writeln!(
@@ -102,8 +102,8 @@ pub(super) fn write(picture: &Picture) -> String {
     out
 }
 
-fn draw_node(out: &mut String, picture: &Picture, index: usize, r: Rect, depth: usize) {
-    let node: &Node = &picture.nodes[index];
+fn draw_node(out: &mut String, diagram: &Diagram, index: usize, r: Rect, depth: usize) {
+    let node: &DiagramNode = &diagram.nodes[index];
     let (fill, stroke, ink) = colours(node.tone);
     let (cx, cy) = r.middle();
     match node.shape {
@@ -138,7 +138,7 @@ fn draw_node(out: &mut String, picture: &Picture, index: usize, r: Rect, depth: 
     if node.ins.is_empty() && node.outs.is_empty() {
         return;
     }
-    let top = r.y + header(picture, index);
+    let top = r.y + header(diagram, index);
     let _ = writeln!(
         out,
         "<path d=\"M{:.1},{:.1} h{:.1}\" stroke=\"{stroke}\" stroke-width=\"0.6\"/>",
@@ -164,7 +164,7 @@ fn draw_node(out: &mut String, picture: &Picture, index: usize, r: Rect, depth: 
 }
 
 /// The text at the top of a node. A group's is drawn over the edges that pass there, with a rim in the group's colour.
-fn draw_heading(out: &mut String, node: &Node, r: Rect, rim: Option<&str>) {
+fn draw_heading(out: &mut String, node: &DiagramNode, r: Rect, rim: Option<&str>) {
     let ink = colours(node.tone).2;
     let cx = r.x + r.w / 2.0;
     let rim = rim.map_or_else(String::new, |c| format!(" stroke=\"{c}\" stroke-width=\"5\" paint-order=\"stroke\""));
@@ -187,7 +187,7 @@ fn draw_heading(out: &mut String, node: &Node, r: Rect, rim: Option<&str>) {
 }
 
 /// The fill of a group: its tone's, or that of its depth.
-fn group_colour(node: &Node, depth: usize) -> &'static str {
+fn group_colour(node: &DiagramNode, depth: usize) -> &'static str {
     if node.tone == Tone::Plain { group_fill(depth) } else { colours(node.tone).0 }
 }
 
@@ -212,10 +212,10 @@ fn draw_label(out: &mut String, lines: &[String], r: Rect, beside: bool) {
 }
 
 /// The path of an edge: its runs as straight lines, smooth curves from one to the next.
-fn path(route: &Route, direction: Direction) -> String {
+fn path(route: &Route, direction: RankDirection) -> String {
     let point = |along: f64, across: f64| match direction {
-        Direction::Right => format!("{along:.1},{across:.1}"),
-        Direction::Down => format!("{across:.1},{along:.1}"),
+        RankDirection::Right => format!("{along:.1},{across:.1}"),
+        RankDirection::Down => format!("{across:.1},{along:.1}"),
     };
     if let Some(r) = route.looped {
         let (x, y) = (r.x + r.w, r.y + r.h / 2.0);

@@ -5,7 +5,7 @@
 //! to be a condition or an activity is silently none.
 
 use crate::model::finding::Origin;
-use crate::model::program::Beside;
+use crate::model::program::AuxiliaryFunction;
 use mlua::{Function, Result, Table, Value};
 
 /// A field that means nothing where it stands.
@@ -43,7 +43,7 @@ const ACTIVE: &[(&str, &str)] = &[
 
 /// Fields that mean nothing, of every object of a machine's flat list. `place` gives places: by the number of the spot, the
 /// number in the list, and a word.
-pub fn fields(list: &Table, native: &Table, place: &mut super::lower::Places<'_>) -> Result<Vec<Field>> {
+pub fn fields(list: &Table, native: &Table, place: &mut super::lower::OriginLookup<'_>) -> Result<Vec<Field>> {
     let kind: Function = native.raw_get("kind")?;
     let mut found = Vec::new();
     for number in 1..=list.raw_len() {
@@ -125,11 +125,11 @@ pub fn beside(
     template: &Table,
     list: &Table,
     native: &Table,
-    place: &mut super::lower::Places<'_>,
-) -> Result<Vec<Beside>> {
+    place: &mut super::lower::OriginLookup<'_>,
+) -> Result<Vec<AuxiliaryFunction>> {
     let plugin_of: Table = native.raw_get("plugin_of")?;
     let previews = native.raw_get::<Option<bool>>("previews")?.unwrap_or(false);
-    let mut found: Vec<Beside> = Vec::new();
+    let mut found: Vec<AuxiliaryFunction> = Vec::new();
     for number in 1..=list.raw_len() {
         let row: Table = list.raw_get(number)?;
         let table: Table = row.raw_get("table")?;
@@ -145,7 +145,7 @@ pub fn beside(
                 }
             };
             let origin = place(spot, number, word);
-            found.push(Beside { place: at, part: part.to_owned(), plugin, origin });
+            found.push(AuxiliaryFunction { place: at, part: part.to_owned(), plugin, origin });
         };
         if number == 1 {
             for key in ["getevents", "idle_hook", "dbg", "err", "warn", "info"] {

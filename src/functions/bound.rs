@@ -2,11 +2,11 @@
 
 use super::budget::Budget;
 use super::errors::{message_of, undefined_global, without_address};
-use super::tables::{Refused, Tables};
+use super::tables::{NotBuilt, Tables};
 use super::voice::Voice;
 use crate::limits;
 use crate::model::Openings;
-use crate::statechart::{Chart, EdgeId, EventId, Kind, Machine, NodeId, Printer, View};
+use crate::statechart::{Chart, EdgeId, EventId, HookContext, Machine, NodeId, NodeKind, Printer};
 use mlua::{Function, Lua, LuaString, Result, Table, Thread, Value};
 use std::cell::{Cell, RefCell};
 use std::rc::Rc;
@@ -86,7 +86,7 @@ impl BoundMachine {
         (budget, voice): (&Rc<Budget>, &Rc<Voice>),
         native: &Table,
         fsm: &Table,
-    ) -> std::result::Result<Self, Refused> {
+    ) -> std::result::Result<Self, NotBuilt> {
         let (tables, written) = Tables::new(lua, native, fsm)?;
         let given = |key: &str| -> Result<bool> { Ok(matches!(fsm.raw_get(key)?, Value::Function(_))) };
         let polls = given("_polls")?;
@@ -204,7 +204,7 @@ impl BoundMachine {
     }
 
     /// The events of the step that a view shows.
-    pub fn events(&self, lua: &Lua, view: &View<'_>) -> Result<Table> {
+    pub fn events(&self, lua: &Lua, view: &HookContext<'_>) -> Result<Table> {
         if let Some(table) = &*self.events.borrow() {
             return Ok(table.clone());
         }
@@ -227,7 +227,7 @@ impl BoundMachine {
     }
 
     /// Makes a call that sees what `view` shows; what it sends goes into the view's queue.
-    pub fn calling<R>(&self, view: &mut View<'_>, call: impl FnOnce() -> Result<R>) -> Result<R> {
+    pub fn calling<R>(&self, view: &mut HookContext<'_>, call: impl FnOnce() -> Result<R>) -> Result<R> {
         {
             let mut status = self.status.borrow_mut();
             status.leaf = view.leaf;
@@ -300,7 +300,7 @@ impl BoundMachine {
             return "inactive";
         }
         let chart = &self.tables.borrow().chart;
-        let settled = chart.kind(node) == Kind::Leaf
+        let settled = chart.kind(node) == NodeKind::Leaf
             && status.leaf == Some(node)
             && (chart.doo(node).is_none() || status.through);
         if settled { "done" } else { "active" }

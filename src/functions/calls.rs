@@ -6,7 +6,9 @@ use super::tracing;
 use crate::limits;
 use crate::model::EventName;
 use crate::model::statechart::FunctionId;
-use crate::statechart::{ActionPlace, Chart, Doo, EdgeId, EventId, Hook, NodeId, Printer, Queue, Said, Trace, View};
+use crate::statechart::{
+    ActionPlace, Chart, Doo, EdgeId, EventId, FunctionOutput, Hook, HookContext, NodeId, Printer, Queue, Trace,
+};
 use mlua::thread::ThreadStatus;
 use mlua::{Lua, LuaString, Result, Value};
 use std::rc::Rc;
@@ -28,7 +30,7 @@ impl std::fmt::Debug for Functions {
 
 impl Functions {
     /// Calls a step hook with the table of the step's events. `false`: it raised an error that ends the step.
-    fn step_hook(&self, field: &LuaString, view: &mut View<'_>) -> bool {
+    fn step_hook(&self, field: &LuaString, view: &mut HookContext<'_>) -> bool {
         let bound = &self.bound;
         let Ok(Value::Function(hook)) = bound.fsm.raw_get(field) else { return true };
         let outcome = bound
@@ -81,14 +83,14 @@ impl Functions {
         }
     }
 
-    fn guarded(&self, function: FunctionId, edge: EdgeId, view: &mut View<'_>) -> Result<Value> {
+    fn guarded(&self, function: FunctionId, edge: EdgeId, view: &mut HookContext<'_>) -> Result<Value> {
         let bound = &self.bound;
         let events = bound.events(&self.lua, view)?;
         let tables = bound.tables();
         bound.calling(view, || tables.function(function).call((tables.edge(edge), events)))
     }
 
-    fn resumed(&self, function: FunctionId, state: NodeId, view: &mut View<'_>) -> Result<Doo> {
+    fn resumed(&self, function: FunctionId, state: NodeId, view: &mut HookContext<'_>) -> Result<Doo> {
         let bound = &self.bound;
         let tables = bound.tables();
         if bound.traces.get() && bound.thread.borrow().is_none() {
@@ -137,7 +139,7 @@ impl Hook for Functions {
         self.bound.event_text(chart, event)
     }
 
-    fn seconds(&mut self, function: FunctionId, state: NodeId, view: &mut View<'_>) -> Option<f64> {
+    fn seconds(&mut self, function: FunctionId, state: NodeId, view: &mut HookContext<'_>) -> Option<f64> {
         let bound = &self.bound;
         let tables = bound.tables();
         let seconds = bound.calling(view, || tables.function(function).call::<f64>(()));
@@ -151,7 +153,7 @@ impl Hook for Functions {
         }
     }
 
-    fn said(&mut self, said: &mut Vec<Said>) {
+    fn said(&mut self, said: &mut Vec<FunctionOutput>) {
         self.bound.voice.drain(said);
     }
 
@@ -163,7 +165,7 @@ impl Hook for Functions {
         self.bound.traces.get()
     }
 
-    fn trace(&mut self, what: Trace<'_>, view: &mut View<'_>) {
+    fn trace(&mut self, what: Trace<'_>, view: &mut HookContext<'_>) {
         tracing::tell(&self.lua, &self.bound, what, view);
     }
 
@@ -203,7 +205,7 @@ impl Hook for Functions {
     }
 
     fn poll(&mut self, queue: &mut Queue) -> bool {
-        // What was sent between two turns.
+        // What was sent between two microsteps.
         for event in self.bound.status.borrow_mut().outbox.drain(..) {
             queue.push(event);
         }
@@ -228,7 +230,7 @@ impl Hook for Functions {
         }
     }
 
-    fn before_step(&mut self, view: &mut View<'_>, events: &mut Vec<EventId>) -> bool {
+    fn before_step(&mut self, view: &mut HookContext<'_>, events: &mut Vec<EventId>) -> bool {
         *self.bound.events.borrow_mut() = None;
         self.bound.look_for_dbg();
         let goes_on = self.step_hook(&self.bound.words.pre_step, view);
@@ -236,7 +238,7 @@ impl Hook for Functions {
         goes_on
     }
 
-    fn after_step(&mut self, view: &mut View<'_>) {
+    fn after_step(&mut self, view: &mut HookContext<'_>) {
         if self.bound.failed.borrow().is_none() {
             self.step_hook(&self.bound.words.post_step, view);
         }
@@ -244,7 +246,7 @@ impl Hook for Functions {
         self.bound.show_leaf(view.leaf);
     }
 
-    fn guard(&mut self, function: FunctionId, edge: EdgeId, view: &mut View<'_>) -> bool {
+    fn guard(&mut self, function: FunctionId, edge: EdgeId, view: &mut HookContext<'_>) -> bool {
         match self.guarded(function, edge, view) {
             Ok(value) => value != Value::Boolean(false),
             Err(error) => {
@@ -255,7 +257,7 @@ impl Hook for Functions {
         }
     }
 
-    fn predicate(&mut self, function: FunctionId, event: EventId, view: &mut View<'_>) -> bool {
+    fn predicate(&mut self, function: FunctionId, event: EventId, view: &mut HookContext<'_>) -> bool {
         let bound = &self.bound;
         let value = bound.value(event);
         let tables = bound.tables();
@@ -269,7 +271,7 @@ impl Hook for Functions {
         }
     }
 
-    fn action(&mut self, function: FunctionId, place: ActionPlace, view: &mut View<'_>) {
+    fn action(&mut self, function: FunctionId, place: ActionPlace, view: &mut HookContext<'_>) {
         let bound = &self.bound;
         let tables = bound.tables();
         let function = tables.function(function);
@@ -303,7 +305,7 @@ impl Hook for Functions {
         *self.bound.thread.borrow_mut() = None;
     }
 
-    fn doo(&mut self, function: FunctionId, state: NodeId, view: &mut View<'_>) -> Doo {
+    fn doo(&mut self, function: FunctionId, state: NodeId, view: &mut HookContext<'_>) -> Doo {
         match self.resumed(function, state, view) {
             Ok(Doo::Finished) => {
                 self.bound.status.borrow_mut().through = true;

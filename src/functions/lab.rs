@@ -6,7 +6,7 @@ use super::values::to_json;
 use super::world::state;
 use crate::limits;
 use crate::model::Openings;
-use crate::statechart::Said;
+use crate::statechart::FunctionOutput;
 use mlua::{Lua, MultiValue};
 use std::collections::BTreeMap;
 use std::rc::Rc;
@@ -47,7 +47,7 @@ impl Lab {
     }
 
     /// What was printed since the last time.
-    pub fn said(&self) -> Vec<Said> {
+    pub fn said(&self) -> Vec<FunctionOutput> {
         let mut said = Vec::new();
         self.host.voice.drain(&mut said);
         said

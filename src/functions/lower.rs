@@ -2,7 +2,7 @@
 
 use crate::limits;
 use crate::model::statechart::{
-    Action, Connector, FunctionId, Node, Since, State, Statechart, Timed, Transition, Trigger,
+    Action, ChartNode, ChartTransition, Connector, FunctionId, Since, State, Statechart, TimeEvent, Trigger,
 };
 use crate::model::{Code, ConfigId, EventName, Ident, Origin, codes};
 use mlua::{Function, Result, Table, Value};
@@ -43,21 +43,21 @@ pub struct Lowered {
 }
 
 /// Gives places: by the number of the spot, the number in the list, and a word.
-pub type Places<'a> = dyn FnMut(Option<usize>, usize, &str) -> Origin + 'a;
+pub type OriginLookup<'a> = dyn FnMut(Option<usize>, usize, &str) -> Origin + 'a;
 
 struct Lowering<'a, 'p> {
     functions: Vec<Function>,
     plugins: Vec<(FunctionId, String)>,
     values: Vec<(Value, EventName)>,
     problems: Vec<Problem>,
-    places: &'a mut Places<'p>,
+    places: &'a mut OriginLookup<'p>,
     timed_class: Table,
     /// By function: the plugin that added it.
     plugin_of: Table,
 }
 
 /// The flat list that `rfsm.lua` makes of a machine, as a chart.
-pub fn lower(list: &Table, native: &Table, places: &mut Places<'_>) -> Result<Lowered> {
+pub fn lower(list: &Table, native: &Table, places: &mut OriginLookup<'_>) -> Result<Lowered> {
     let (timed_class, plugin_of) = (native.raw_get("timed_class")?, native.raw_get("plugin_of")?);
     let mut with = Lowering {
         functions: Vec::new(),
@@ -70,7 +70,7 @@ pub fn lower(list: &Table, native: &Table, places: &mut Places<'_>) -> Result<Lo
     };
     let length = list.raw_len();
     // By number in the list: states not yet put into their parents.
-    let mut made: Vec<Option<(State, usize, Option<Node>)>> = Vec::with_capacity(length);
+    let mut made: Vec<Option<(State, usize, Option<ChartNode>)>> = Vec::with_capacity(length);
     let mut transitions = Vec::new();
     for number in 1..=length {
         let row: Table = list.raw_get(number)?;
@@ -96,7 +96,7 @@ pub fn lower(list: &Table, native: &Table, places: &mut Places<'_>) -> Result<Lo
         };
         if what == "connector" {
             let doc = None;
-            made.push(Some((State::new(name), scope, Some(Node::Connector(Connector { name, doc, origin })))));
+            made.push(Some((State::new(name), scope, Some(ChartNode::Connector(Connector { name, doc, origin })))));
         } else {
             let state = with.state(name, &table, number, spot, origin)?;
             made.push(Some((state, scope, None)));
@@ -113,7 +113,7 @@ pub fn lower(list: &Table, native: &Table, places: &mut Places<'_>) -> Result<Lo
     for number in (1..made.len()).rev() {
         let Some((state, scope, connector)) = made[number].take() else { continue };
         if let Some(Some((parent, ..))) = made.get_mut(scope.wrapping_sub(1)) {
-            parent.children.insert(0, connector.unwrap_or(Node::State(state)));
+            parent.children.insert(0, connector.unwrap_or(ChartNode::State(state)));
         }
     }
     let mut chart =
@@ -219,8 +219,8 @@ impl Lowering<'_, '_> {
         number: usize,
         spot: Option<usize>,
         origin: Origin,
-    ) -> Result<Transition> {
-        let mut out = Transition { origin, ..Transition::default() };
+    ) -> Result<ChartTransition> {
+        let mut out = ChartTransition { origin, ..ChartTransition::default() };
         for (key, end) in [("src", &mut out.src), ("tgt", &mut out.tgt)] {
             match row.raw_get::<Value>(key)? {
                 Value::Nil => {}
@@ -311,7 +311,7 @@ impl Lowering<'_, '_> {
                         return Ok(None);
                     }
                 };
-                Some(Trigger::Timed(Timed { since, seconds, id, by }))
+                Some(Trigger::Timed(TimeEvent { since, seconds, id, by }))
             }
             Value::Nil => None,
             other => {

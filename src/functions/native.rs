@@ -5,10 +5,10 @@ use super::calls::Functions;
 use super::host::{Host, run};
 use super::lower::Spot;
 use super::merge::merge;
-use super::tables::{Refused, address};
+use super::tables::{NotBuilt, address};
 use super::values::to_json;
 use crate::limits;
-use crate::statechart::{Hook, Kind, Machine, NodeId, Printer, TurnResult};
+use crate::statechart::{Hook, Machine, MicrostepResult, NodeId, NodeKind, Printer};
 use crate::time::Time;
 use mlua::{Function, Lua, MultiValue, Result, Table, Value};
 use std::rc::{Rc, Weak};
@@ -66,8 +66,8 @@ pub fn install(lua: &Lua, host: &Rc<Host>) -> Result<()> {
                 host.machines.borrow_mut().insert(address(&fsm), Rc::new(bound));
                 Ok(None)
             }
-            Err(Refused::Lua(error)) => Err(error),
-            Err(Refused::Findings(findings)) => {
+            Err(NotBuilt::Lua(error)) => Err(error),
+            Err(NotBuilt::Findings(findings)) => {
                 let all: Vec<String> = findings.into_iter().map(|f| f.message).collect();
                 Ok(Some(all.join("; ")))
             }
@@ -200,9 +200,9 @@ fn growing(lua: &Lua, host: &Rc<Host>) -> Result<()> {
         let (bound, id) = state_of(host, &node)?;
         let kind = bound.tables().chart.kind(id);
         Ok(match kind {
-            Kind::Leaf => "leaf",
-            Kind::Composite => "composite",
-            Kind::Connector => "connector",
+            NodeKind::Leaf => "leaf",
+            NodeKind::Composite => "composite",
+            NodeKind::Connector => "connector",
         })
     })?;
     // Nothing: any event does; else whether the transition lists this one.
@@ -321,7 +321,7 @@ fn flush(bound: &BoundMachine) {
     }
 }
 
-/// rFSM's step: turns until `steps` of them counted or nothing is left to do.
+/// rFSM's step: microsteps until `steps` of them counted or nothing is left to do.
 fn drive(lua: &Lua, host: &Host, bound: &Rc<BoundMachine>, machine: &mut Machine, steps: f64) -> Result<bool> {
     let mut calls = Functions { lua: lua.clone(), bound: bound.clone(), _host: None };
     bound.look_for_dbg();
@@ -331,7 +331,7 @@ fn drive(lua: &Lua, host: &Host, bound: &Rc<BoundMachine>, machine: &mut Machine
     for _ in 0..limits::CHART_RUN.saturating_add(asked) {
         let now = now(host)?;
         let before = machine.work();
-        let turn = machine.turn(&bound.tables().chart, now, &mut calls);
+        let microstep = machine.microstep(&bound.tables().chart, now, &mut calls);
         bound.status.borrow_mut().leaf = machine.leaf();
         bound.show_leaf(machine.leaf());
         if let Some(error) = bound.failed.borrow_mut().take() {
@@ -341,11 +341,11 @@ fn drive(lua: &Lua, host: &Host, bound: &Rc<BoundMachine>, machine: &mut Machine
         if host.budget.count.look(limits::TURN_INSTRUCTIONS.saturating_add(searched)) {
             return Err(host.budget.count.error());
         }
-        let idle = match turn {
-            TurnResult::NotEntered => return Ok(false),
-            TurnResult::Unmatched => continue,
-            TurnResult::Entered | TurnResult::Taken => false,
-            TurnResult::Quiet { idle } => idle,
+        let idle = match microstep {
+            MicrostepResult::NotEntered => return Ok(false),
+            MicrostepResult::Unmatched => continue,
+            MicrostepResult::Entered | MicrostepResult::Taken => false,
+            MicrostepResult::Quiet { idle } => idle,
         };
         left -= 1.0;
         if left < 1.0 {

@@ -9,9 +9,9 @@ use super::tables::address;
 use super::unset::UnsetWatch;
 use super::world::{run_program, state};
 use crate::limits;
-use crate::model::program::{Beside, Program};
+use crate::model::program::{AuxiliaryFunction, Program};
 use crate::model::{Origin, Statechart};
-use crate::statechart::{Printer, Said};
+use crate::statechart::{FunctionOutput, Printer};
 use crate::time::Clock;
 use mlua::{Function, Lua, Table, Value};
 use std::sync::Arc;
@@ -64,11 +64,11 @@ pub struct Reads {
     /// Whether it needs Lua to run: functions, hooks, plugins, `getevents`, `dbg`.
     pub runs_lua: bool,
     /// What was printed.
-    pub said: Vec<Said>,
+    pub said: Vec<FunctionOutput>,
     /// Fields that mean nothing.
     pub fields: Vec<Field>,
     /// Functions that are called beside those of the chart.
-    pub beside: Vec<Beside>,
+    pub beside: Vec<AuxiliaryFunction>,
     /// Globals that it read and that nobody has set, and where.
     pub unset: Vec<(String, Spot)>,
 }

@@ -3,7 +3,7 @@
 use super::lower::{self, Lowered};
 use crate::model::statechart::FunctionId;
 use crate::model::{EventName, Finding, Origin, Severity, Statechart};
-use crate::statechart::{Chart, EdgeId, EventId, Kind, NodeId, compile};
+use crate::statechart::{Chart, EdgeId, EventId, NodeId, NodeKind, compile};
 use mlua::{Function, Lua, Result, Table, Value};
 use rustc_hash::FxHashMap;
 
@@ -30,12 +30,12 @@ pub struct Tables {
 }
 
 /// Why a machine could not be made of its tables.
-pub enum Refused {
+pub enum NotBuilt {
     Lua(mlua::Error),
     Findings(Vec<Finding>),
 }
 
-impl From<mlua::Error> for Refused {
+impl From<mlua::Error> for NotBuilt {
     fn from(error: mlua::Error) -> Self {
         Self::Lua(error)
     }
@@ -43,7 +43,7 @@ impl From<mlua::Error> for Refused {
 
 impl Tables {
     /// Compiles a machine's tables; answers also the chart as written.
-    pub fn new(lua: &Lua, native: &Table, fsm: &Table) -> std::result::Result<(Self, Statechart), Refused> {
+    pub fn new(lua: &Lua, native: &Table, fsm: &Table) -> std::result::Result<(Self, Statechart), NotBuilt> {
         let list = lower::flat(native, fsm)?;
         // A transition is known by its number; nothing else needs a place here.
         let mut places = |_: Option<usize>, number: usize, word: &str| {
@@ -53,11 +53,11 @@ impl Tables {
             lower::lower(&list, native, &mut places)?;
         if !problems.is_empty() {
             let findings = problems.into_iter().map(|p| Finding::error(p.code, p.message).help(p.help));
-            return Err(Refused::Findings(findings.collect()));
+            return Err(NotBuilt::Findings(findings.collect()));
         }
         let (chart, findings) = compile(&written);
         let Some(chart) = chart else {
-            return Err(Refused::Findings(findings.into_iter().filter(|f| f.severity == Severity::Error).collect()));
+            return Err(NotBuilt::Findings(findings.into_iter().filter(|f| f.severity == Severity::Error).collect()));
         };
         let mut by_number: FxHashMap<u32, Table> = FxHashMap::default();
         let mut next = transitions.into_iter();
@@ -164,7 +164,7 @@ impl Tables {
     /// The table of the node of the next number.
     pub(super) fn push_node(&mut self, lua: &Lua, node: NodeId, table: Value) -> Result<()> {
         let mut done = Value::Nil;
-        if self.chart.kind(node) == Kind::Leaf {
+        if self.chart.kind(node) == NodeKind::Leaf {
             let text = format!("e_done@{}", self.chart.fqn(node));
             self.known.insert(text.as_bytes().into(), self.chart.completion(node));
             done = Value::String(lua.create_string(text)?);

@@ -2,11 +2,11 @@
 
 use super::bound::BoundMachine;
 use crate::limits;
-use crate::statechart::{Chart, EventId, NodeId, Trace, View};
+use crate::statechart::{Chart, EventId, HookContext, NodeId, Trace};
 use mlua::{Lua, Result, Value};
 
 /// Tells the model's `dbg` what happens. An error of it is told to `err`.
-pub fn tell(lua: &Lua, bound: &BoundMachine, what: Trace<'_>, view: &mut View<'_>) {
+pub fn tell(lua: &Lua, bound: &BoundMachine, what: Trace<'_>, view: &mut HookContext<'_>) {
     let chart = view.chart;
     let fqn = |node: NodeId| chart.fqn(node).to_string();
     let (tag, words) = match what {
@@ -52,7 +52,7 @@ pub fn tell_idle(lua: &Lua, bound: &BoundMachine) {
 }
 
 /// The same of a `doo`.
-pub fn tell_doo(lua: &Lua, bound: &BoundMachine, word: &str, state: NodeId, view: &mut View<'_>) {
+pub fn tell_doo(lua: &Lua, bound: &BoundMachine, word: &str, state: NodeId, view: &mut HookContext<'_>) {
     let words = [word.to_owned(), view.chart.fqn(state).to_string()];
     let told = bound.calling(view, || call(lua, bound, "DOO", &words));
     complain(bound, told);

@@ -2,13 +2,13 @@
 
 use crate::limits;
 use crate::model::finding::count;
-use crate::statechart::{Printer, Said};
+use crate::statechart::{FunctionOutput, Printer};
 use std::cell::{Cell, RefCell};
 
 /// What was printed, bounded.
 #[derive(Debug, Default)]
 pub struct Voice {
-    lines: RefCell<Vec<Said>>,
+    lines: RefCell<Vec<FunctionOutput>>,
     lost: Cell<usize>,
     /// Events that found no room: since that was last told, and before.
     no_room: Cell<u64>,
@@ -28,7 +28,7 @@ impl Voice {
         } else {
             text.to_owned()
         };
-        lines.push(Said { by, text });
+        lines.push(FunctionOutput { by, text });
     }
 
     /// Counts events that found no room; how many there were is told once a step.
@@ -42,18 +42,18 @@ impl Voice {
     }
 
     /// Moves all of it to the end of `out`.
-    pub fn drain(&self, out: &mut Vec<Said>) {
+    pub fn drain(&self, out: &mut Vec<FunctionOutput>) {
         out.append(&mut self.lines.borrow_mut());
         let events = self.no_room.replace(0);
         if events > 0 {
             self.no_room_before.set(self.no_room_before.get() + events);
             let (events, most) = (count(grouped(events), "event"), grouped(limits::CHART_QUEUE as u64));
             let text = format!("{events} found no room: at most {most} wait for a step");
-            out.push(Said { by: Printer::Err, text });
+            out.push(FunctionOutput { by: Printer::Err, text });
         }
         let lost = self.lost.replace(0);
         if lost > 0 {
-            out.push(Said {
+            out.push(FunctionOutput {
                 by: Printer::Warn,
                 text: format!("{} left out: too much was printed at once", count(lost, "more line")),
             });

@@ -6,7 +6,7 @@ use super::words::{CONDITIONS, SIGNALS};
 
 /// An example of Lua as YAML spells it; none: it is no key with a value, no call and no table.
 pub fn as_yaml(example: &str) -> Option<String> {
-    let mut reader = Reader { rest: example.trim() };
+    let mut reader = ExampleParser { rest: example.trim() };
     let mut entries = Vec::new();
     loop {
         entries.push(reader.entry()?);
@@ -16,7 +16,7 @@ pub fn as_yaml(example: &str) -> Option<String> {
         }
     }
     match &entries[..] {
-        [(None, Said::Name(_) | Said::Text(_))] => None,
+        [(None, ExampleValue::Name(_) | ExampleValue::Text(_))] => None,
         [(None, alone)] => Some(match alone.change() {
             Some((verb, parts)) => format!("{verb}: {{ {parts} }}"),
             None => alone.yaml(),
@@ -44,11 +44,11 @@ pub fn told_in_yaml(text: &str) -> String {
 /// Whether what is quoted is an example: keys with values, a table, or what a word of the language makes. Steps as plans print them,
 /// time events and calls of operations are written alike in both languages.
 fn is_example(text: &str) -> bool {
-    let mut reader = Reader { rest: text.trim() };
+    let mut reader = ExampleParser { rest: text.trim() };
     match reader.entry() {
         Some((Some(key), _)) => !key.contains(['.', '-']),
-        Some((None, Said::Call(word, _))) => is_word(&word),
-        Some((None, Said::Table(_))) => true,
+        Some((None, ExampleValue::Call(word, _))) => is_word(&word),
+        Some((None, ExampleValue::Table(_))) => true,
         _ => false,
     }
 }
@@ -62,15 +62,15 @@ fn is_word(word: &str) -> bool {
 }
 
 /// A value.
-enum Said {
+enum ExampleValue {
     /// A name, a number: as it stands.
     Name(String),
     Text(String),
-    Table(Vec<(Option<String>, Said)>),
-    Call(String, Vec<(Option<String>, Said)>),
+    Table(Vec<(Option<String>, ExampleValue)>),
+    Call(String, Vec<(Option<String>, ExampleValue)>),
 }
 
-impl Said {
+impl ExampleValue {
     fn yaml(&self) -> String {
         match self {
             Self::Name(name) if name == "math.huge" => ".inf".to_owned(),
@@ -106,7 +106,7 @@ impl Said {
     }
 }
 
-impl Said {
+impl ExampleValue {
     /// The word of a change, and its parts by name: in Lua they are its arguments.
     fn change(&self) -> Option<(&'static str, String)> {
         let Self::Call(word, entries) = self else { return None };
@@ -120,17 +120,17 @@ impl Said {
     }
 }
 
-fn parts_of(of: &Primitive, entries: &[(Option<String>, Said)]) -> String {
+fn parts_of(of: &Primitive, entries: &[(Option<String>, ExampleValue)]) -> String {
     let mut parts = Vec::new();
     let mut given = entries.iter().map(|(_, value)| value);
     for argument in of.arguments {
         match argument.strip_suffix('…') {
             Some(list) => {
-                let rest: Vec<String> = given.by_ref().map(Said::yaml).collect();
+                let rest: Vec<String> = given.by_ref().map(ExampleValue::yaml).collect();
                 parts.extend((!rest.is_empty()).then(|| format!("{list}: [{}]", rest.join(", "))));
             }
             None => match given.next() {
-                Some(Said::Table(options)) if *argument == "options" => parts.push(inside(options)),
+                Some(ExampleValue::Table(options)) if *argument == "options" => parts.push(inside(options)),
                 Some(value) => parts.push(format!("{argument}: {}", value.yaml())),
                 None => {}
             },
@@ -139,19 +139,19 @@ fn parts_of(of: &Primitive, entries: &[(Option<String>, Said)]) -> String {
     parts.join(", ")
 }
 
-fn inside(entries: &[(Option<String>, Said)]) -> String {
-    let one = |(key, value): &(Option<String>, Said)| match key {
+fn inside(entries: &[(Option<String>, ExampleValue)]) -> String {
+    let one = |(key, value): &(Option<String>, ExampleValue)| match key {
         Some(key) => format!("{key}: {}", value.yaml()),
         None => value.yaml(),
     };
     entries.iter().map(one).collect::<Vec<_>>().join(", ")
 }
 
-struct Reader<'t> {
+struct ExampleParser<'t> {
     rest: &'t str,
 }
 
-impl<'t> Reader<'t> {
+impl<'t> ExampleParser<'t> {
     /// Goes past a mark and the blanks behind it.
     fn skip(&mut self, mark: &str) -> Option<()> {
         self.rest = self.rest.strip_prefix(mark)?.trim_start();
@@ -159,18 +159,18 @@ impl<'t> Reader<'t> {
     }
 
     /// A value, with its key where it has one.
-    fn entry(&mut self) -> Option<(Option<String>, Said)> {
+    fn entry(&mut self) -> Option<(Option<String>, ExampleValue)> {
         if self.rest.starts_with('[') {
             // A key that is no name in Lua.
             self.skip("[")?;
-            let Said::Text(key) = self.value()? else { return None };
+            let ExampleValue::Text(key) = self.value()? else { return None };
             self.skip("]")?;
             self.skip("=")?;
             return Some((Some(key), self.value()?));
         }
         let value = self.value()?;
         match value {
-            Said::Name(key) if self.rest.starts_with('=') => {
+            ExampleValue::Name(key) if self.rest.starts_with('=') => {
                 self.skip("=")?;
                 Some((Some(key), self.value()?))
             }
@@ -178,7 +178,7 @@ impl<'t> Reader<'t> {
         }
     }
 
-    fn entries(&mut self, open: &str, close: &str) -> Option<Vec<(Option<String>, Said)>> {
+    fn entries(&mut self, open: &str, close: &str) -> Option<Vec<(Option<String>, ExampleValue)>> {
         self.skip(open)?;
         let mut entries = Vec::new();
         while self.skip(close).is_none() {
@@ -190,37 +190,37 @@ impl<'t> Reader<'t> {
         Some(entries)
     }
 
-    fn value(&mut self) -> Option<Said> {
+    fn value(&mut self) -> Option<ExampleValue> {
         if let Some(quote) = self.rest.chars().next().filter(|c| matches!(c, '"' | '\'')) {
             let (text, rest) = self.rest[1..].split_once(quote)?;
             self.rest = rest.trim_start();
-            return Some(Said::Text(text.to_owned()));
+            return Some(ExampleValue::Text(text.to_owned()));
         }
         if self.rest.starts_with('{') {
-            return Some(Said::Table(self.entries("{", "}")?));
+            return Some(ExampleValue::Table(self.entries("{", "}")?));
         }
         let mut value = self.word()?;
         // What a method is called on comes first.
         while self.rest.starts_with(':') {
             self.skip(":")?;
-            let Said::Call(word, mut entries) = self.word()? else { return None };
+            let ExampleValue::Call(word, mut entries) = self.word()? else { return None };
             entries.insert(0, (None, value));
-            value = Said::Call(word, entries);
+            value = ExampleValue::Call(word, entries);
         }
         Some(value)
     }
 
     /// A name or a number, or what is made with a word.
-    fn word(&mut self) -> Option<Said> {
+    fn word(&mut self) -> Option<ExampleValue> {
         let is_part = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '.' | '-' | '…');
         let end = self.rest.find(|c| !is_part(c)).unwrap_or(self.rest.len());
         let (word, rest) = self.rest.split_at(end);
         self.rest = rest.trim_start();
         match self.rest.chars().next() {
             _ if word.is_empty() => None,
-            Some('(') => Some(Said::Call(word.to_owned(), self.entries("(", ")")?)),
-            Some('{') => Some(Said::Call(word.to_owned(), self.entries("{", "}")?)),
-            _ => Some(Said::Name(word.to_owned())),
+            Some('(') => Some(ExampleValue::Call(word.to_owned(), self.entries("(", ")")?)),
+            Some('{') => Some(ExampleValue::Call(word.to_owned(), self.entries("{", "}")?)),
+            _ => Some(ExampleValue::Name(word.to_owned())),
         }
     }
 }

@@ -18,7 +18,7 @@ use crate::limits;
 use crate::model::finding::{count, nearest};
 use crate::model::program::{Openings, Program};
 use crate::model::{Code, Finding, Findings, Origin, Statechart, codes};
-use crate::statechart::{Printer, Said};
+use crate::statechart::{FunctionOutput, Printer};
 use rustc_hash::FxHashMap;
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -227,7 +227,7 @@ pub fn mentions(text: &str, word: &str) -> bool {
 const PRINTS_SHOWN: usize = 5;
 
 /// One remark about all that a file prints while it is loaded. Without a place: nobody knows the lines.
-fn printed(file: &str, said: &[Said]) -> Option<Finding> {
+fn printed(file: &str, said: &[FunctionOutput]) -> Option<Finding> {
     let lines: Vec<&str> = said.iter().filter(|said| said.by != Printer::Dbg).map(|said| said.text.as_str()).collect();
     let mut message = format!("`{file}` prints while it is loaded: ");
     let shown: Vec<String> = lines.iter().take(PRINTS_SHOWN).map(|line| line.chars().take(200).collect()).collect();

@@ -17,7 +17,7 @@ enum Open {
     Map { entries: Vec<Entry>, key: Option<(Cow<'static, str>, Origin)>, seen: FxHashMap<String, Origin> },
 }
 
-struct Frame {
+struct OpenCollection {
     open: Open,
     origin: Origin,
     anchor: usize,
@@ -30,10 +30,10 @@ const SMALL_MAP: usize = 8;
 /// Stands for a key that was there already, until its value has been read. No YAML text can hold this character.
 const AGAIN: Cow<'static, str> = Cow::Borrowed("\0");
 
-struct Reader<'a> {
+struct YamlReader<'a> {
     cx: &'a mut Cx,
     reading: Reading,
-    stack: Vec<Frame>,
+    stack: Vec<OpenCollection>,
     /// Trees with an anchor, with their number of nodes.
     anchors: FxHashMap<usize, (Node, usize)>,
     nodes: usize,
@@ -43,7 +43,7 @@ struct Reader<'a> {
 /// Reads the text of `reading`'s file. None, with findings, when it does not parse.
 pub fn read(cx: &mut Cx, reading: Reading) -> Option<Node> {
     let text = cx.sources.file(reading.file).text.clone();
-    let mut reader = Reader { cx, reading, stack: Vec::new(), anchors: FxHashMap::default(), nodes: 0, root: None };
+    let mut reader = YamlReader { cx, reading, stack: Vec::new(), anchors: FxHashMap::default(), nodes: 0, root: None };
     match reader.run(&text) {
         Ok(()) => Some(reader.root.take().unwrap_or(Node::new(Kind::Null, reading.whole))),
         Err(finding) => {
@@ -53,14 +53,14 @@ pub fn read(cx: &mut Cx, reading: Reading) -> Option<Node> {
     }
 }
 
-type Step = Result<(), Box<Finding>>;
+type ReadResult = Result<(), Box<Finding>>;
 
 fn small(n: usize) -> u32 {
     u32::try_from(n).unwrap_or(u32::MAX)
 }
 
-impl Reader<'_> {
-    fn run(&mut self, text: &str) -> Step {
+impl YamlReader<'_> {
+    fn run(&mut self, text: &str) -> ReadResult {
         let mut parser = Parser::new_from_str(text);
         let mut documents = 0;
         while let Some(event) = parser.next_event() {
@@ -132,7 +132,7 @@ impl Reader<'_> {
         Box::new(Finding::error(code, format!("this is not YAML: {}", error.info())).at(origin).help(help))
     }
 
-    fn budget(&mut self, origin: Origin) -> Step {
+    fn budget(&mut self, origin: Origin) -> ReadResult {
         if self.nodes <= limits::TEXT_NODES {
             return Ok(());
         }
@@ -144,7 +144,7 @@ impl Reader<'_> {
         ))
     }
 
-    fn open(&mut self, open: Open, span: Span, anchor: usize, tag: Option<&Tag>) -> Step {
+    fn open(&mut self, open: Open, span: Span, anchor: usize, tag: Option<&Tag>) -> ReadResult {
         let origin = self.origin(span);
         if let Some(tag) = tag
             && !(tag.is_yaml_core_schema() && matches!(tag.suffix.as_str(), "map" | "seq"))
@@ -159,11 +159,11 @@ impl Reader<'_> {
                     .help("nothing that Davit reads needs so many levels: a bracket is probably not closed"),
             ));
         }
-        self.stack.push(Frame { open, origin, anchor, nodes: 1 });
+        self.stack.push(OpenCollection { open, origin, anchor, nodes: 1 });
         Ok(())
     }
 
-    fn close(&mut self) -> Step {
+    fn close(&mut self) -> ReadResult {
         let Some(frame) = self.stack.pop() else { return Ok(()) };
         let kind = match frame.open {
             Open::List(list) => Kind::List(list),
@@ -173,7 +173,7 @@ impl Reader<'_> {
     }
 
     /// A complete node: remembered if it has an anchor, then put where it belongs.
-    fn node(&mut self, node: Node, anchor: usize, nodes: usize) -> Step {
+    fn node(&mut self, node: Node, anchor: usize, nodes: usize) -> ReadResult {
         self.nodes += 1;
         self.budget(node.origin)?;
         if anchor > 0 {
@@ -185,7 +185,7 @@ impl Reader<'_> {
         self.place(node, nodes)
     }
 
-    fn place(&mut self, node: Node, nodes: usize) -> Step {
+    fn place(&mut self, node: Node, nodes: usize) -> ReadResult {
         let Some(frame) = self.stack.last_mut() else {
             self.root = Some(node);
             return Ok(());

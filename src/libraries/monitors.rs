@@ -6,14 +6,16 @@
 
 use crate::model::Monitor;
 use crate::model::monitor::MONITORS_TYPE;
-use crate::monitor::{Bank, Sample, Troubles};
-use crate::runtime::{Builder, Component, Context, EventOut, Kind, Libraries, Library, Out, Probes, Prop, Sight};
+use crate::monitor::{Bank, InputSample, Troubles};
+use crate::runtime::{
+    Builder, Component, ComponentFactory, Context, EventOut, Libraries, Library, Out, Probes, Prop, Sight,
+};
 use std::sync::Arc;
 
 /// The library with the component type that evaluates `monitors`.
 pub fn library(monitors: &[Monitor]) -> Library {
     let plan = Arc::new(MonitorPlan::new(monitors));
-    Library::new("davit").with_kind(Kind::made_by(MONITORS_TYPE, move |b| Monitors::new_of(&plan, b)))
+    Library::new("davit").with_kind(ComponentFactory::made_by(MONITORS_TYPE, move |b| Monitors::new_of(&plan, b)))
 }
 
 /// The libraries of a deployment with these monitors: with one more if there are any.
@@ -44,7 +46,7 @@ struct Monitors {
     enabled: Vec<Prop<bool>>,
     is_enabled: Vec<bool>,
     probes: Probes,
-    samples: Vec<Sample>,
+    samples: Vec<InputSample>,
     events: EventOut,
     verdicts: Vec<Out<bool>>,
     robustness: Vec<Out<f64>>,
@@ -133,7 +135,7 @@ impl Monitors {
             is_enabled: vec![false; enabled.len()],
             enabled,
             probes,
-            samples: vec![Sample::default(); plan.bank.inputs().len()],
+            samples: vec![InputSample::default(); plan.bank.inputs().len()],
             events,
             verdicts,
             robustness,

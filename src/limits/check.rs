@@ -20,8 +20,8 @@ pub const CHECK_WAITING_MOST: usize = 6;
 /// Transitions up to which following counts as easy: then it is done anew with more batches that wait, if there are any.
 pub const CHECK_EASY: usize = 10_000;
 
-/// Worlds in which `check` goes round a circle that leaves a frame of one configuration each time, until the oldest frames are
-/// squashed, where following is easy; else in one. In each of them all requests of the circle are planned as often as frames have
+/// Worlds in which `check` goes round a cycle that leaves a frame of one configuration each time, until the oldest frames are
+/// squashed, where following is easy; else in one. In each of them all requests of the cycle are planned as often as frames have
 /// room.
 pub const CHECK_ROUNDS: usize = 4;
 
@@ -61,7 +61,7 @@ pub const CHECK_FRAMES: usize = 3;
 pub const CHECK_LEFT: usize = 2;
 
 /// States on a way from a safety event to a safe configuration.
-pub const CHECK_CIRCLE: usize = 128;
+pub const CHECK_CYCLE: usize = 128;
 
 /// Answers one after the other that `check` follows on the way up or down; more of them only a coordinator gives that goes
 /// round for ever.
@@ -76,7 +76,7 @@ pub const CHECK_STANDS: usize = 64;
 /// Ways in which what one step asks for may meet what is under way, and that are followed.
 pub const CHECK_FORKS: usize = 64;
 
-/// Circles of answers that are told; more of them say nothing new.
+/// Cycles of answers that are told; more of them say nothing new.
 pub const CHECK_TOLD: usize = 4;
 
 /// Types as which configurations create one component, up to which `check` judges each configuration by them: a hot swap

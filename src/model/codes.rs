@@ -212,11 +212,12 @@ codes! {
         "Types under `types:` say which ports, properties and operations a component has, not what it does. The simulated \
          platform runs them all the same; the embedded platform needs the code, which comes with a library. Use \
          `platform: simulated`, or a type of one of the libraries; your own code goes into a library of your own program.";
-    TYPE_DIFFERS = "type::differs", "a declared type is another than the library's type of that name",
+    TYPE_DIFFERS = "type::differs", "a declared type is another than the library's or the platform's type of that name",
         "The deployment declares a type under `types:` that one of its libraries has as well. The library's is what runs and what \
          configurations are judged by; the declaration is held against it. It is an error where something that the declaration allows \
          would fail (a member, an argument or a value that the library does not take), else a warning. Write what the library has, or \
-         leave the declaration out.";
+         leave the declaration out. A platform of a program's own is asked for its types when a deployment begins: where plans could \
+         fail on it, nothing is begun.";
     TYPE_UNKNOWN_OPERATION = "type::unknown_operation", "the undo of an operation is not an operation that fits",
         "An operation's `effect: { undo: NAME }` names another operation of the same type, which takes the same arguments \
          or none. Otherwise a configuration that calls it could not be undone when it matters. Correct the name or the \

@@ -1,7 +1,7 @@
 //! Walking through conditions: everything in one, its signals, the components that it looks at.
 
 use super::finding::Origin;
-use super::monitor::{Condition, ConditionKind, Signal, SignalKind};
+use super::monitor::{Condition, ConditionKind, MonitoredSignal, SignalKind};
 use super::names::ComponentName;
 
 impl Condition {
@@ -25,7 +25,7 @@ impl Condition {
     }
 
     /// Calls `f` with every signal in it, outer ones first.
-    pub fn for_each_signal<'a>(&'a self, f: &mut impl FnMut(&'a Signal)) {
+    pub fn for_each_signal<'a>(&'a self, f: &mut impl FnMut(&'a MonitoredSignal)) {
         self.for_each(&mut |condition| {
             if let ConditionKind::Compare { left, right, .. } = &condition.kind {
                 left.for_each(f);
@@ -76,7 +76,7 @@ impl Condition {
     }
 }
 
-impl Signal {
+impl MonitoredSignal {
     /// Calls `f` with every component that it looks at.
     fn for_each_component_mut(&mut self, f: &mut impl FnMut(&mut ComponentName)) {
         use SignalKind as K;
@@ -123,16 +123,17 @@ mod tests {
         let port = |text: &str| text.parse::<PortSignal>().unwrap();
         let name = |text: &str| ComponentName::new(text).unwrap();
         let about = |who: &str| {
-            let signal = |kind| Box::new(Signal::new(kind));
+            let signal = |kind| Box::new(MonitoredSignal::new(kind));
             let list = vec![
-                Signal::new(SignalKind::Abs(signal(SignalKind::Port(port(&format!("{who}.x[1]")))))),
-                Signal::new(SignalKind::Age(port(&format!("{who}.x")).member)),
-                Signal::new(SignalKind::Difference(
+                MonitoredSignal::new(SignalKind::Abs(signal(SignalKind::Port(port(&format!("{who}.x[1]")))))),
+                MonitoredSignal::new(SignalKind::Age(port(&format!("{who}.x")).member)),
+                MonitoredSignal::new(SignalKind::Difference(
                     signal(SignalKind::Rate { port: port(&format!("{who}.x")).member, over: Duration::from_secs(1) }),
                     signal(SignalKind::Constant(1.0)),
                 )),
             ];
-            let (left, right) = (Signal::new(SignalKind::Norm(list)), Signal::new(SignalKind::Constant(2.0)));
+            let (left, right) =
+                (MonitoredSignal::new(SignalKind::Norm(list)), MonitoredSignal::new(SignalKind::Constant(2.0)));
             let compare = K::Compare { left, op: Comparison::Above, right, hysteresis: None };
             let leaves = [
                 compare,

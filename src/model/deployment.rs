@@ -71,7 +71,7 @@ pub struct Coordinator {
     /// Its name, by which its frames are known. One without a name of its own is called like the deployment.
     pub name: Ident,
     /// How it came to its name.
-    pub written: Written,
+    pub written: CoordinatorNaming,
     /// Its statechart.
     pub chart: Statechart,
     /// Its state that means *up*: a name or a path (`operational`, `root.operational`).
@@ -86,7 +86,7 @@ pub struct Coordinator {
 
 /// How a deployment names a coordinator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Written {
+pub enum CoordinatorNaming {
     /// `coordinator: FILE`: it has the name of the deployment.
     #[default]
     Alone,

@@ -1,8 +1,8 @@
 //! Where the functions of a coordinator stand.
 
 use super::finding::Origin;
-use super::program::Beside;
-use super::statechart::{FunctionId, Node, ROOT, State, Statechart};
+use super::program::AuxiliaryFunction;
+use super::statechart::{ChartNode, FunctionId, ROOT, State, Statechart};
 use std::collections::BTreeMap;
 
 /// A state or a transition with functions.
@@ -35,11 +35,11 @@ impl FunctionPlace {
 }
 
 /// All places of functions in a chart, in written order, with those of what is called beside it.
-pub fn function_places(chart: &Statechart, beside: &[Beside]) -> Vec<FunctionPlace> {
+pub fn function_places(chart: &Statechart, beside: &[AuxiliaryFunction]) -> Vec<FunctionPlace> {
     let plugins: BTreeMap<FunctionId, &str> = chart.plugins.iter().map(|(id, plugin)| (*id, plugin.as_str())).collect();
     let mut places = Vec::new();
     collect(&chart.root, ROOT, &plugins, &mut places);
-    for Beside { place, part, plugin, origin } in beside {
+    for AuxiliaryFunction { place, part, plugin, origin } in beside {
         let part = (part.clone(), plugin.clone());
         match places.iter_mut().find(|p| p.what == *place) {
             Some(known) => known.parts.push(part),
@@ -67,7 +67,7 @@ fn collect(state: &State, fqn: &str, plugins: &BTreeMap<FunctionId, &str>, place
         }
     }
     for child in &state.children {
-        if let Node::State(inner) = child {
+        if let ChartNode::State(inner) = child {
             collect(inner, &format!("{fqn}.{}", inner.name), plugins, places);
         }
     }

@@ -28,8 +28,8 @@ pub use component_type::{
 };
 pub use configuration::{Call, Change, ChangeKind, Configuration, Confirm, OnFailure, Policy};
 pub use deployment::{
-    Activity, BringUp, Coordinator, Deployment, DeploymentLimits, FaultKind, OPERATOR, OperatorMay, SimulatedReaction,
-    StepFault, TakeDown, Written,
+    Activity, BringUp, Coordinator, CoordinatorNaming, Deployment, DeploymentLimits, FaultKind, OPERATOR, OperatorMay,
+    SimulatedReaction, StepFault, TakeDown,
 };
 pub use event::{Ask, FAULTED, Raise, RequestId, Verdict};
 pub use finding::{Code, Finding, Findings, Origin, Severity};

@@ -62,11 +62,11 @@ pub enum ConditionKind {
     /// Two signals compared.
     Compare {
         /// The left side.
-        left: Signal,
+        left: MonitoredSignal,
         /// How.
         op: Comparison,
         /// The right side.
-        right: Signal,
+        right: MonitoredSignal,
         /// Once true, it stays true until the left side is this much beyond the right one; 0 or more, in the signals'
         /// unit. Of ordered comparisons only.
         hysteresis: Option<f64>,
@@ -190,7 +190,7 @@ pub struct Interval {
 
 /// Something that has a number at every instant, or none.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Signal {
+pub struct MonitoredSignal {
     /// What.
     pub kind: SignalKind,
     /// Where it was written.
@@ -219,15 +219,15 @@ pub enum SignalKind {
         counter: Counter,
     },
     /// The Euclidean norm of several signals.
-    Norm(Vec<Signal>),
+    Norm(Vec<MonitoredSignal>),
     /// The first minus the second.
-    Difference(Box<Signal>, Box<Signal>),
+    Difference(Box<MonitoredSignal>, Box<MonitoredSignal>),
     /// The smallest of several.
-    Min(Vec<Signal>),
+    Min(Vec<MonitoredSignal>),
     /// The largest of several.
-    Max(Vec<Signal>),
+    Max(Vec<MonitoredSignal>),
     /// Without its sign.
-    Abs(Box<Signal>),
+    Abs(Box<MonitoredSignal>),
     /// Always this number.
     Constant(f64),
 }
@@ -271,12 +271,12 @@ pub struct PortSignal {
     /// The port.
     pub member: MemberRef,
     /// The way to the number in the port's value; empty: the value itself.
-    pub path: Vec<Part>,
+    pub path: Vec<ValuePart>,
 }
 
 /// One step into a value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Part {
+pub enum ValuePart {
     /// The field of a record.
     Field(Ident),
     /// The element of an array, from 0.
@@ -295,8 +295,8 @@ impl fmt::Display for PortSignal {
         write!(f, "{}", self.member)?;
         for part in &self.path {
             match part {
-                Part::Field(field) => write!(f, ".{field}")?,
-                Part::Index(index) => write!(f, "[{index}]")?,
+                ValuePart::Field(field) => write!(f, ".{field}")?,
+                ValuePart::Index(index) => write!(f, "[{index}]")?,
             }
         }
         Ok(())
@@ -322,12 +322,14 @@ impl std::str::FromStr for PortSignal {
                 // Digits alone: `usize` would read `+3` too, which is printed otherwise.
                 let digits = !index.is_empty() && index.bytes().all(|b| b.is_ascii_digit());
                 let index = index.parse().ok().filter(|_| digits);
-                path.push(Part::Index(index.ok_or_else(|| bad("an index is a whole number from 0, as in `[3]`"))?));
+                path.push(ValuePart::Index(
+                    index.ok_or_else(|| bad("an index is a whole number from 0, as in `[3]`"))?,
+                ));
                 rest = after;
             } else {
                 let field = rest.strip_prefix('.').ok_or_else(|| bad("after `]` comes `.field` or `[index]`"))?;
                 let (field, after) = field.split_at(end(field));
-                path.push(Part::Field(field.parse()?));
+                path.push(ValuePart::Field(field.parse()?));
                 rest = after;
             }
         }
@@ -342,7 +344,7 @@ impl Monitor {
     }
 
     /// Calls `f` with every signal in it, outer ones first.
-    pub fn for_each_signal<'a>(&'a self, f: &mut impl FnMut(&'a Signal)) {
+    pub fn for_each_signal<'a>(&'a self, f: &mut impl FnMut(&'a MonitoredSignal)) {
         self.when.for_each_signal(f);
     }
 
@@ -364,12 +366,13 @@ impl Condition {
     /// When `port` is not written like `self.mode`, with `.field` or `[index]` behind it where there is one.
     pub fn compare(port: &str, op: Comparison, value: f64) -> Self {
         let port = port.parse().expect("the signal of a port");
-        let (left, right) = (Signal::new(SignalKind::Port(port)), Signal::new(SignalKind::Constant(value)));
+        let (left, right) =
+            (MonitoredSignal::new(SignalKind::Port(port)), MonitoredSignal::new(SignalKind::Constant(value)));
         Self::new(ConditionKind::Compare { left, op, right, hysteresis: None })
     }
 }
 
-impl Signal {
+impl MonitoredSignal {
     /// A signal of that kind that was never written in a file.
     pub fn new(kind: SignalKind) -> Self {
         Self { kind, origin: Origin::NONE }

@@ -44,9 +44,6 @@ pub enum Cause {
 pub enum Execution {
     /// Wait-free and bounded: may run in the configurator's own thread.
     Immediate,
-    /// Hardly takes time, but runs code that is not the platform's: on a worker, several in one call
-    /// (`Platform::execute_brief`), since the way to the worker would cost more than they do.
-    Brief,
-    /// May take until its deadline: runs on a worker.
+    /// May take until its deadline: runs on a worker, alone or in one call with others (`Platform::execute_batch`).
     Blocking,
 }

@@ -3,12 +3,12 @@
 //! For whoever writes a chart in another form. References are followed as far as they lead to something; what leads
 //! nowhere is left out here, and `crate::statechart::compile` says what is wrong with it.
 
-use super::statechart::{INITIAL, Node, ROOT, State, Statechart, Transition};
+use super::statechart::{ChartNode, ChartTransition, INITIAL, ROOT, State, Statechart};
 use std::collections::HashMap;
 
 /// A node of the outline.
 #[derive(Debug, Clone)]
-pub struct Item<'m> {
+pub struct OutlineNode<'m> {
     /// Its full name: `root.sync.copying`.
     pub fqn: String,
     /// Its name in its parent.
@@ -21,22 +21,22 @@ pub struct Item<'m> {
 
 /// A transition with its ends: indices into [`Outline::items`].
 #[derive(Debug, Clone)]
-pub struct Link<'m> {
+pub struct OutlineTransition<'m> {
     /// The source.
     pub src: usize,
     /// The target as written: a composite state stands for its initial connector.
     pub tgt: usize,
     /// The transition.
-    pub transition: &'m Transition,
+    pub transition: &'m ChartTransition,
 }
 
 /// The nodes and transitions of a chart, in rFSM's order: a scope's own transitions before those of the states in it.
 #[derive(Debug, Clone, Default)]
 pub struct Outline<'m> {
     /// States and connectors; a state stands before what is in it, and the root is first.
-    pub items: Vec<Item<'m>>,
+    pub items: Vec<OutlineNode<'m>>,
     /// Transitions.
-    pub links: Vec<Link<'m>>,
+    pub links: Vec<OutlineTransition<'m>>,
     children: HashMap<(usize, &'m str), usize>,
 }
 
@@ -50,7 +50,7 @@ impl<'m> Outline<'m> {
             for transition in &state.transitions {
                 let end = |text: &Option<(String, _)>| outline.find(scope, &text.as_ref()?.0);
                 if let (Some(src), Some(tgt)) = (end(&transition.src), end(&transition.tgt)) {
-                    outline.links.push(Link { src, tgt, transition });
+                    outline.links.push(OutlineTransition { src, tgt, transition });
                 }
             }
         }
@@ -62,8 +62,8 @@ impl<'m> Outline<'m> {
         scopes.push((at, state));
         for child in &state.children {
             match child {
-                Node::State(inner) => self.walk(inner, inner.name.as_str(), Some(at), scopes),
-                Node::Connector(connector) => _ = self.add(connector.name.as_str(), Some(at), None),
+                ChartNode::State(inner) => self.walk(inner, inner.name.as_str(), Some(at), scopes),
+                ChartNode::Connector(connector) => _ = self.add(connector.name.as_str(), Some(at), None),
             }
         }
         let implied = state.transitions.iter().any(|t| t.src.as_ref().is_some_and(|(src, _)| src == INITIAL));
@@ -81,7 +81,7 @@ impl<'m> Outline<'m> {
             }
             None => name.to_owned(),
         };
-        self.items.push(Item { fqn, name, parent, state });
+        self.items.push(OutlineNode { fqn, name, parent, state });
         at
     }
 

@@ -21,12 +21,12 @@ pub struct Program {
     /// What is open to it.
     pub open: Openings,
     /// Functions that are called beside those of its chart.
-    pub beside: Vec<Beside>,
+    pub beside: Vec<AuxiliaryFunction>,
 }
 
 /// A function that is called beside those of the chart: `getevents`, a printer, a step hook.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Beside {
+pub struct AuxiliaryFunction {
     /// What it belongs to, as findings name it: `` `root` ``, `` `a` → `b` ``.
     pub place: String,
     /// The key it stands under.

@@ -63,9 +63,9 @@ pub struct State {
     /// Its name in its parent.
     pub name: Ident,
     /// Child states and connectors, as written.
-    pub children: Vec<Node>,
+    pub children: Vec<ChartNode>,
     /// The transitions written in this state's scope, as written. Their source need not be a child.
-    pub transitions: Vec<Transition>,
+    pub transitions: Vec<ChartTransition>,
     /// What happens on entry, in this order.
     pub entry: Vec<(Action, Origin)>,
     /// What happens on exit, in this order.
@@ -101,16 +101,16 @@ impl State {
     pub fn is_pure(&self) -> bool {
         self.doo.is_none()
             && self.entry.iter().chain(&self.exit).all(|(action, _)| action.is_pure())
-            && self.transitions.iter().all(Transition::is_pure)
+            && self.transitions.iter().all(ChartTransition::is_pure)
             && self.children.iter().all(|child| match child {
-                Node::State(state) => state.is_pure(),
-                Node::Connector(_) => true,
+                ChartNode::State(state) => state.is_pure(),
+                ChartNode::Connector(_) => true,
             })
     }
 
     /// Whether something is so of it or of a state inside.
     fn any(&self, is: &impl Fn(&Self) -> bool) -> bool {
-        let inside = |child: &Node| matches!(child, Node::State(state) if state.any(is));
+        let inside = |child: &ChartNode| matches!(child, ChartNode::State(state) if state.any(is));
         is(self) || self.children.iter().any(inside)
     }
 
@@ -140,28 +140,28 @@ impl State {
         }
         for child in &mut self.children {
             match child {
-                Node::State(state) => state.places(visit),
-                Node::Connector(connector) => visit(&mut connector.origin),
+                ChartNode::State(state) => state.places(visit),
+                ChartNode::Connector(connector) => visit(&mut connector.origin),
             }
         }
     }
 
     /// The child of that name.
-    pub fn child(&self, name: &str) -> Option<&Node> {
+    pub fn child(&self, name: &str) -> Option<&ChartNode> {
         self.children.iter().find(|child| child.name().as_str() == name)
     }
 }
 
 /// A child of a state.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Node {
+pub enum ChartNode {
     /// A state.
     State(State),
     /// A connector: a junction where transitions meet and part.
     Connector(Connector),
 }
 
-impl Node {
+impl ChartNode {
     /// Its name in its parent.
     pub fn name(&self) -> Ident {
         match self {
@@ -199,7 +199,7 @@ impl Connector {
 
 /// A transition, in the scope in which it was written.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Transition {
+pub struct ChartTransition {
     /// The text that names its source: a name of the scope (`copying`), a path from the root (`root.sync.copying`,
     /// `sync.copying`) or a path from the scope (`.copying.five_DOF_mode`). None is an error that `compile` reports.
     pub src: Option<(String, Origin)>,
@@ -219,7 +219,7 @@ pub struct Transition {
     pub origin: Origin,
 }
 
-impl Transition {
+impl ChartTransition {
     /// A transition between two nodes on any of `events`.
     pub fn new(src: &str, tgt: &str, events: impl IntoIterator<Item = Trigger>) -> Self {
         Self {
@@ -286,7 +286,7 @@ pub enum Trigger {
     /// An event of that name. `e_done` alone means the completion of the transition's source.
     Event(EventName),
     /// The passing of time.
-    Timed(Timed),
+    Timed(TimeEvent),
     /// Any event for which the function says yes.
     Predicate(FunctionId),
 }
@@ -296,7 +296,7 @@ pub enum Trigger {
 /// It is raised inside the chart, under the name `e_after(ID)@SOURCE`, once per visit of the transition's source, when
 /// *more* than that time has passed since the source was entered (`e_after`) or since the clock's start (`e_at`).
 #[derive(Debug, Clone, PartialEq)]
-pub struct Timed {
+pub struct TimeEvent {
     /// Since when the time counts.
     pub since: Since,
     /// The time in seconds, finite. A negative one has always passed.
@@ -327,7 +327,7 @@ impl Since {
     }
 }
 
-impl Timed {
+impl TimeEvent {
     /// The event's name where it is raised: `e_after(ID)@SOURCE`.
     pub fn event_of(&self, source: &str) -> String {
         format!("{}({})@{source}", self.since.word(), self.id)
@@ -344,7 +344,7 @@ impl Trigger {
         for since in [Since::Entry, Since::Start] {
             let inner = text.strip_prefix(since.word()).and_then(|rest| rest.strip_prefix('('));
             if let Some(inner) = inner {
-                let timed = inner.strip_suffix(')').and_then(|inner| Timed::parse(since, inner));
+                let timed = inner.strip_suffix(')').and_then(|inner| TimeEvent::parse(since, inner));
                 return timed.map(Self::Timed).ok_or_else(|| NameError {
                     text: text.to_owned(),
                     kind: "time event",
@@ -357,11 +357,11 @@ impl Trigger {
 
     /// The time event of so many seconds, named by the shortest text of the number (`e_after(1)`, `e_after(0.5)`).
     pub fn timed(since: Since, seconds: f64) -> Self {
-        Self::Timed(Timed { since, seconds, id: seconds.to_string(), by: None })
+        Self::Timed(TimeEvent { since, seconds, id: seconds.to_string(), by: None })
     }
 }
 
-impl Timed {
+impl TimeEvent {
     fn parse(since: Since, inner: &str) -> Option<Self> {
         let (number, id) = match inner.split_once(',') {
             Some((number, id)) => (number.trim(), id.trim()),
@@ -373,7 +373,7 @@ impl Timed {
     }
 }
 
-impl fmt::Display for Timed {
+impl fmt::Display for TimeEvent {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if self.id.parse() == Ok(self.seconds) {
             write!(f, "{}({})", self.since.word(), self.id)
@@ -423,7 +423,7 @@ mod tests {
     #[test]
     fn origins_are_no_part_of_the_meaning() {
         let mut a = Statechart::default();
-        a.root.transitions.push(Transition::new("initial", "a", [Trigger::parse("e").unwrap()]));
+        a.root.transitions.push(ChartTransition::new("initial", "a", [Trigger::parse("e").unwrap()]));
         let mut b = a.clone();
         b.root.origin = Origin(7);
         b.root.transitions[0].origin = Origin(8);
@@ -441,7 +441,7 @@ mod tests {
             let mut root = State::new(Ident::new(ROOT).unwrap());
             let mut inner = State::new(Ident::new("a").unwrap());
             change(&mut inner);
-            root.children.push(Node::State(inner));
+            root.children.push(ChartNode::State(inner));
             Statechart::new(root).is_pure()
         };
         let call = (Action::Function(FunctionId(0)), Origin::NONE);
@@ -449,8 +449,10 @@ mod tests {
         assert!(!with(&|s| s.doo = Some(function)));
         assert!(!with(&|s| s.entry.push(call)));
         assert!(!with(&|s| s.exit.push(call)));
-        assert!(!with(&|s| s.transitions.push(Transition { guard: Some(function), ..Transition::default() })));
-        assert!(!with(&|s| s.transitions.push(Transition { effect: vec![call], ..Transition::default() })));
-        assert!(!with(&|s| s.transitions.push(Transition::new("a", "b", [Trigger::Predicate(FunctionId(0))]))));
+        assert!(!with(&|s| s
+            .transitions
+            .push(ChartTransition { guard: Some(function), ..ChartTransition::default() })));
+        assert!(!with(&|s| s.transitions.push(ChartTransition { effect: vec![call], ..ChartTransition::default() })));
+        assert!(!with(&|s| s.transitions.push(ChartTransition::new("a", "b", [Trigger::Predicate(FunctionId(0))]))));
     }
 }

@@ -1,6 +1,6 @@
 //! Values and their types.
 
-use super::monitor::Part;
+use super::monitor::ValuePart;
 use super::names::Ident;
 use crate::model::finding::count;
 use serde::{Deserialize, Serialize};
@@ -234,12 +234,12 @@ impl Value {
     }
 
     /// The number on this way into the value, bools as 0 and 1; none when there is no number.
-    pub fn number(&self, path: &[Part]) -> Option<f64> {
+    pub fn number(&self, path: &[ValuePart]) -> Option<f64> {
         match (path.split_first(), self) {
             (None, Self::Bool(v)) => Some(f64::from(u8::from(*v))),
             (None, value) => value.as_f64(),
-            (Some((Part::Index(index), rest)), Self::Array(values)) => values.get(*index)?.number(rest),
-            (Some((Part::Field(field), rest)), Self::Record(fields)) => {
+            (Some((ValuePart::Index(index), rest)), Self::Array(values)) => values.get(*index)?.number(rest),
+            (Some((ValuePart::Field(field), rest)), Self::Record(fields)) => {
                 fields.iter().find(|(name, _)| name == field).and_then(|(_, value)| value.number(rest))
             }
             _ => None,

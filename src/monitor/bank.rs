@@ -10,7 +10,7 @@ use std::time::Duration;
 
 /// Something that monitors look at.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub enum Input {
+pub enum MonitorInput {
     /// A number in what a port carries (bools as 0 and 1). With an empty path, also ports that carry no number: then only
     /// when they were written matters.
     Port(PortSignal),
@@ -27,7 +27,7 @@ pub enum Input {
     },
 }
 
-impl Input {
+impl MonitorInput {
     /// The value of a port itself.
     pub fn whole(member: MemberRef) -> Self {
         Self::Port(PortSignal::whole(member))
@@ -36,7 +36,7 @@ impl Input {
 
 /// As the columns of a file of samples are called: `Arm.force[0]`, `state(Arm)`, `faulted(Arm)`,
 /// `activity(control.overruns)`.
-impl fmt::Display for Input {
+impl fmt::Display for MonitorInput {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Port(port) => write!(f, "{port}"),
@@ -59,7 +59,7 @@ pub fn state_value(state: RunState) -> f64 {
 
 /// What an input holds.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Sample {
+pub struct InputSample {
     /// The value; NaN when what was written is no number.
     pub value: f64,
     /// When it was written last: from then on it counts, or from the last step on if that was later. Of states and
@@ -71,7 +71,7 @@ pub struct Sample {
     pub present: bool,
 }
 
-impl Sample {
+impl InputSample {
     /// The value, NaN when there is none.
     pub(super) fn number(&self) -> f64 {
         if self.present { self.value } else { f64::NAN }
@@ -102,10 +102,10 @@ pub struct Troubles {
 /// All monitors of a deployment.
 #[derive(Debug, Clone)]
 pub struct Bank {
-    inputs: Vec<Input>,
+    inputs: Vec<MonitorInput>,
     /// Of which the value matters, not only when it comes.
     valued: Vec<bool>,
-    samples: Vec<Sample>,
+    samples: Vec<InputSample>,
     watches: Vec<WatchedMonitor>,
     last: Time,
     troubles: Troubles,
@@ -117,7 +117,7 @@ struct WatchedMonitor {
     program: CompiledCondition,
     /// Its inputs in the bank, and what they held when it was last evaluated.
     slots: Box<[usize]>,
-    held: Box<[Sample]>,
+    held: Box<[InputSample]>,
     /// Which of them are ports, whose samples tell their instant.
     stamped: Box<[bool]>,
     raise: Option<EventName>,
@@ -164,12 +164,12 @@ impl Bank {
 
     /// The same, with another number of pieces that each operator over time may keep (two at least).
     pub fn with_memory(monitors: &[Monitor], pieces: usize) -> Self {
-        let mut inputs: Vec<Input> = Vec::new();
+        let mut inputs: Vec<MonitorInput> = Vec::new();
         let mut valued: Vec<bool> = Vec::new();
-        let mut known: rustc_hash::FxHashMap<Input, usize> = rustc_hash::FxHashMap::default();
+        let mut known: rustc_hash::FxHashMap<MonitorInput, usize> = rustc_hash::FxHashMap::default();
         let watches = monitors.iter().map(|monitor| {
             let (program, own) = compile(&monitor.when, pieces);
-            let stamped = own.iter().map(|input| matches!(input, (Input::Port(_), _))).collect();
+            let stamped = own.iter().map(|input| matches!(input, (MonitorInput::Port(_), _))).collect();
             let slots: Box<[usize]> = own
                 .into_iter()
                 .map(|(input, matters)| {
@@ -184,7 +184,7 @@ impl Bank {
                 .collect();
             WatchedMonitor {
                 program,
-                held: vec![Sample::default(); slots.len()].into(),
+                held: vec![InputSample::default(); slots.len()].into(),
                 slots,
                 stamped,
                 raise: monitor.raise,
@@ -199,12 +199,12 @@ impl Bank {
             }
         });
         let watches = watches.collect();
-        let samples = vec![Sample::default(); inputs.len()];
+        let samples = vec![InputSample::default(); inputs.len()];
         Self { inputs, valued, samples, watches, last: Time::default(), troubles: Troubles::default() }
     }
 
     /// What the monitors look at, each once; [`Bank::step`] reads them by their index here.
-    pub fn inputs(&self) -> &[Input] {
+    pub fn inputs(&self) -> &[MonitorInput] {
         &self.inputs
     }
 
@@ -220,7 +220,12 @@ impl Bank {
     /// its event, in the order in which things came to be, monitor by monitor.
     ///
     /// A time before the last one counts as that one. Nothing is allocated.
-    pub fn step(&mut self, now: Time, read: &mut dyn FnMut(usize) -> Sample, raise: &mut dyn FnMut(usize, EventName)) {
+    pub fn step(
+        &mut self,
+        now: Time,
+        read: &mut dyn FnMut(usize) -> InputSample,
+        raise: &mut dyn FnMut(usize, EventName),
+    ) {
         if now < self.last {
             self.troubles.backwards += 1;
         }
@@ -324,7 +329,7 @@ impl WatchedMonitor {
         }
     }
 
-    fn step(&mut self, before: Time, now: Time, samples: &[Sample], raise: &mut dyn FnMut(EventName)) {
+    fn step(&mut self, before: Time, now: Time, samples: &[InputSample], raise: &mut dyn FnMut(EventName)) {
         let new = self.verdict.is_none();
         match self.sampling {
             Sampling::Every(period) => {
@@ -381,19 +386,19 @@ impl WatchedMonitor {
     }
 
     /// The position from which a sample counts that is not held yet: its own instant, but after the last look.
-    fn arrival(&self, looked: u64, i: usize, sample: &Sample) -> Option<u64> {
+    fn arrival(&self, looked: u64, i: usize, sample: &InputSample) -> Option<u64> {
         let news = self.stamped[i] && sample.present && sample.differs(&self.held[i]);
         news.then(|| sample.at.as_nanos().saturating_mul(2).max(looked.max(self.program.position()) + 1))
     }
 
     /// The first position from which a sample counts that is not held yet.
-    fn pending(&self, looked: u64, samples: &[Sample]) -> u64 {
+    fn pending(&self, looked: u64, samples: &[InputSample]) -> u64 {
         let arrivals = self.slots.iter().enumerate().filter_map(|(i, slot)| self.arrival(looked, i, &samples[*slot]));
         arrivals.min().unwrap_or(u64::MAX)
     }
 
     /// Takes the samples that count from `position` on.
-    fn arrive(&mut self, looked: u64, position: u64, samples: &[Sample]) {
+    fn arrive(&mut self, looked: u64, position: u64, samples: &[InputSample]) {
         for i in 0..self.slots.len() {
             let sample = samples[self.slots[i]];
             if self.arrival(looked, i, &sample).is_some_and(|arrival| arrival <= position) {

@@ -1,11 +1,11 @@
 //! From a condition as written to a program.
 
-use super::bank::{Input, state_value};
-use super::nodes::{Number, Rate, Truth};
+use super::bank::{MonitorInput, state_value};
+use super::nodes::{Number, Rate, TruthNode};
 use super::program::CompiledCondition;
 use super::window::{SinceWindow, Window};
 use crate::limits::MONITOR_PIECES;
-use crate::model::monitor::{Comparison, Condition, ConditionKind, Interval, Signal, SignalKind};
+use crate::model::monitor::{Comparison, Condition, ConditionKind, Interval, MonitoredSignal, SignalKind};
 use std::time::Duration;
 
 /// A time in positions.
@@ -19,7 +19,7 @@ pub fn positions(time: Duration) -> u64 {
 /// What must be merged because the memory of an operator is used up makes the whole condition less true, never more: an
 /// event is raised only when it would be with all the memory in the world. Under an odd number of negations an operator
 /// therefore errs to the other side.
-pub fn compile(condition: &Condition, pieces: usize) -> (CompiledCondition, Vec<(Input, bool)>) {
+pub fn compile(condition: &Condition, pieces: usize) -> (CompiledCondition, Vec<(MonitorInput, bool)>) {
     let mut compiler = Compiler { numbers: Vec::new(), truths: Vec::new(), slots: Vec::new(), pieces };
     compiler.condition(condition, false);
     (CompiledCondition::new(compiler.numbers, compiler.truths), compiler.slots)
@@ -30,13 +30,13 @@ pub const PIECES: usize = MONITOR_PIECES;
 
 struct Compiler {
     numbers: Vec<Number>,
-    truths: Vec<Truth>,
-    slots: Vec<(Input, bool)>,
+    truths: Vec<TruthNode>,
+    slots: Vec<(MonitorInput, bool)>,
     pieces: usize,
 }
 
 impl Compiler {
-    fn slot(&mut self, input: Input) -> usize {
+    fn slot(&mut self, input: MonitorInput) -> usize {
         self.slots.iter().position(|(known, _)| *known == input).unwrap_or_else(|| {
             self.slots.push((input, false));
             self.slots.len() - 1
@@ -44,7 +44,7 @@ impl Compiler {
     }
 
     /// The slot of an input whose value is looked at.
-    fn valued(&mut self, input: Input) -> usize {
+    fn valued(&mut self, input: MonitorInput) -> usize {
         let slot = self.slot(input);
         self.slots[slot].1 = true;
         slot
@@ -55,26 +55,26 @@ impl Compiler {
         self.numbers.len() - 1
     }
 
-    fn truth(&mut self, truth: Truth) -> usize {
+    fn truth(&mut self, truth: TruthNode) -> usize {
         self.truths.push(truth);
         self.truths.len() - 1
     }
 
-    fn signals(&mut self, list: &[Signal]) -> Box<[usize]> {
+    fn signals(&mut self, list: &[MonitoredSignal]) -> Box<[usize]> {
         list.iter().map(|s| self.signal(s)).collect()
     }
 
-    fn signal(&mut self, signal: &Signal) -> usize {
+    fn signal(&mut self, signal: &MonitoredSignal) -> usize {
         let number = match &signal.kind {
-            SignalKind::Port(port) => Number::Input(self.valued(Input::Port(port.clone()))),
+            SignalKind::Port(port) => Number::Input(self.valued(MonitorInput::Port(port.clone()))),
             // Compared directly only; `lang` sees to it. Elsewhere an age has no value.
             SignalKind::Age(_) => Number::Constant(f64::NAN),
             SignalKind::Rate { port, over } => {
-                let slot = self.slot(Input::whole(*port));
+                let slot = self.slot(MonitorInput::whole(*port));
                 Number::Rate(slot, Rate::new(positions(*over), self.pieces))
             }
             SignalKind::Activity { activity, counter } => {
-                Number::Input(self.valued(Input::Activity { activity: *activity, counter: *counter }))
+                Number::Input(self.valued(MonitorInput::Activity { activity: *activity, counter: *counter }))
             }
             SignalKind::Norm(list) => Number::Norm(self.signals(list)),
             SignalKind::Difference(a, b) => Number::Difference(self.signal(a), self.signal(b)),
@@ -99,33 +99,35 @@ impl Compiler {
                     // To the nanosecond; what is out of range is never reached, or always exceeded.
                     #[allow(clippy::cast_possible_truncation)]
                     let bound = (seconds * 1e9).round().clamp(-4e18, 4e18) as i64;
-                    let slot = self.slot(Input::whole(*port));
-                    Truth::Age { slot, op: *op, bound: bound.saturating_mul(2), start: None }
+                    let slot = self.slot(MonitorInput::whole(*port));
+                    TruthNode::Age { slot, op: *op, bound: bound.saturating_mul(2), start: None }
                 }
                 _ => {
                     let (left, right) = (self.signal(left), self.signal(right));
                     let hysteresis = hysteresis.unwrap_or(0.0);
-                    Truth::Compare { left, op: *op, right, hysteresis, holds: false }
+                    TruthNode::Compare { left, op: *op, right, hysteresis, holds: false }
                 }
             },
-            K::IsTrue(port) => Truth::IsTrue(self.valued(Input::Port(port.clone()))),
-            K::InState { component, state } => Truth::Is(self.valued(Input::State(*component)), state_value(*state)),
-            K::Faulted(component) => Truth::IsTrue(self.valued(Input::Faulted(*component))),
-            K::Silent { port, time } => {
-                let slot = self.slot(Input::whole(*port));
-                let bound = i64::try_from(positions(*time)).unwrap_or(i64::MAX);
-                Truth::Age { slot, op: Comparison::Above, bound, start: None }
+            K::IsTrue(port) => TruthNode::IsTrue(self.valued(MonitorInput::Port(port.clone()))),
+            K::InState { component, state } => {
+                TruthNode::Is(self.valued(MonitorInput::State(*component)), state_value(*state))
             }
-            K::All(list) => Truth::All(self.conditions(list, upward)),
-            K::Any(list) => Truth::Any(self.conditions(list, upward)),
-            K::No(c) => Truth::Not(self.condition(c, !upward)),
+            K::Faulted(component) => TruthNode::IsTrue(self.valued(MonitorInput::Faulted(*component))),
+            K::Silent { port, time } => {
+                let slot = self.slot(MonitorInput::whole(*port));
+                let bound = i64::try_from(positions(*time)).unwrap_or(i64::MAX);
+                TruthNode::Age { slot, op: Comparison::Above, bound, start: None }
+            }
+            K::All(list) => TruthNode::All(self.conditions(list, upward)),
+            K::Any(list) => TruthNode::Any(self.conditions(list, upward)),
+            K::No(c) => TruthNode::Not(self.condition(c, !upward)),
             K::Implies(a, b) => {
                 let first = self.condition(a, !upward);
-                let no = self.truth(Truth::Not(first));
-                Truth::Any(Box::new([no, self.condition(b, upward)]))
+                let no = self.truth(TruthNode::Not(first));
+                TruthNode::Any(Box::new([no, self.condition(b, upward)]))
             }
-            K::Rise(c) => Truth::Rise(self.condition(c, upward), None),
-            K::Fall(c) => Truth::Fall(self.condition(c, !upward), None),
+            K::Rise(c) => TruthNode::Rise(self.condition(c, upward), None),
+            K::Fall(c) => TruthNode::Fall(self.condition(c, !upward), None),
             K::Once { condition, interval } => self.once(condition, *interval, upward),
             K::Historically { condition, interval } => self.historically(condition, *interval, upward),
             K::Since { hold, from, interval } => self.since(hold, from, *interval, upward),
@@ -133,8 +135,8 @@ impl Compiler {
                 let interval = Interval { from: Duration::ZERO, to: Some(*time) };
                 let held = self.historically(condition, interval, upward);
                 let held = self.truth(held);
-                let lived = self.truth(Truth::Lived(positions(*time), None));
-                Truth::All(Box::new([held, lived]))
+                let lived = self.truth(TruthNode::Lived(positions(*time), None));
+                TruthNode::All(Box::new([held, lived]))
             }
             K::WithinLast { condition, time } => {
                 self.once(condition, Interval { from: Duration::ZERO, to: Some(*time) }, upward)
@@ -148,30 +150,30 @@ impl Compiler {
         Window::new(newest, oldest, false, self.pieces, upward)
     }
 
-    fn once(&mut self, condition: &Condition, interval: Interval, upward: bool) -> Truth {
+    fn once(&mut self, condition: &Condition, interval: Interval, upward: bool) -> TruthNode {
         let of = self.condition(condition, upward);
-        Truth::Once(of, self.window(interval, upward))
+        TruthNode::Once(of, self.window(interval, upward))
     }
 
-    fn historically(&mut self, condition: &Condition, interval: Interval, upward: bool) -> Truth {
+    fn historically(&mut self, condition: &Condition, interval: Interval, upward: bool) -> TruthNode {
         let of = self.condition(condition, upward);
-        Truth::Historically(of, self.window(interval, !upward))
+        TruthNode::Historically(of, self.window(interval, !upward))
     }
 
     /// With a newer end `a` ago: what the operator with the interval up to now was `a` ago, and `hold` at every instant
     /// after that one.
-    fn since(&mut self, hold: &Condition, from: &Condition, interval: Interval, upward: bool) -> Truth {
+    fn since(&mut self, hold: &Condition, from: &Condition, interval: Interval, upward: bool) -> TruthNode {
         let (hold, from) = (self.condition(hold, upward), self.condition(from, upward));
         let (newest, oldest) = ends(interval);
         let length = if oldest == u64::MAX { oldest } else { oldest.saturating_sub(newest) };
-        let since = Truth::Since(hold, from, SinceWindow::new(length, self.pieces, upward));
+        let since = TruthNode::Since(hold, from, SinceWindow::new(length, self.pieces, upward));
         if newest == 0 {
             return since;
         }
         let since = self.truth(since);
-        let then = self.truth(Truth::Once(since, Window::new(newest, newest, false, self.pieces, upward)));
-        let after = self.truth(Truth::Historically(hold, Window::new(0, newest, true, self.pieces, !upward)));
-        Truth::All(Box::new([then, after]))
+        let then = self.truth(TruthNode::Once(since, Window::new(newest, newest, false, self.pieces, upward)));
+        let after = self.truth(TruthNode::Historically(hold, Window::new(0, newest, true, self.pieces, !upward)));
+        TruthNode::All(Box::new([then, after]))
     }
 }
 

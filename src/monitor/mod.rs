@@ -26,5 +26,5 @@ mod ring;
 pub mod table;
 mod window;
 
-pub use bank::{Bank, Input, Sample, Troubles, state_value};
+pub use bank::{Bank, InputSample, MonitorInput, Troubles, state_value};
 pub use grade::Grade;

@@ -1,8 +1,8 @@
 //! The parts of a compiled condition.
 
-use super::bank::Sample;
+use super::bank::InputSample;
 use super::grade::Grade;
-use super::ring::{Ring, grain};
+use super::ring::{RingBuffer, grain};
 use super::window::{SinceWindow, Window};
 use crate::model::monitor::Comparison;
 
@@ -29,7 +29,7 @@ pub enum Number {
 
 impl Number {
     /// Its value; NaN when it has none.
-    pub fn value(&mut self, position: u64, held: &[Sample], before: &[f64]) -> f64 {
+    pub fn value(&mut self, position: u64, held: &[InputSample], before: &[f64]) -> f64 {
         // Unlike the library's: what has no value makes the whole have none.
         let pick = |list: &[usize], better: fn(f64, f64) -> bool| {
             let mut values = list.iter().map(|i| before[*i]);
@@ -76,7 +76,7 @@ pub struct Rate {
     /// Of the input, when last looked at.
     writes: u64,
     /// Old to new.
-    counts: Ring<NodeMoment>,
+    counts: RingBuffer<NodeMoment>,
     total: u64,
     most: usize,
     merged: u64,
@@ -87,7 +87,7 @@ impl Rate {
     #[allow(clippy::cast_precision_loss)]
     pub fn new(window: u64, most: usize) -> Self {
         let most = most.max(2);
-        let counts = Ring::new(most);
+        let counts = RingBuffer::new(most);
         let seconds = window as f64 / 2e9;
         Self { window, seconds, start: None, writes: 0, counts, total: 0, most, merged: 0 }
     }
@@ -99,7 +99,7 @@ impl Rate {
     }
 
     #[allow(clippy::cast_precision_loss)]
-    fn value(&mut self, position: u64, sample: &Sample) -> f64 {
+    fn value(&mut self, position: u64, sample: &InputSample) -> f64 {
         let Some(start) = self.start else {
             self.start = Some(position);
             self.writes = sample.writes;
@@ -161,7 +161,7 @@ impl Rate {
 
 /// A truth, from samples, numbers, and truths before it in the list.
 #[derive(Debug, Clone)]
-pub enum Truth {
+pub enum TruthNode {
     /// Two numbers compared; `holds` is what it was before, for the hysteresis.
     Compare { left: usize, op: Comparison, right: usize, hysteresis: f64, holds: bool },
     /// The age of an input's newest sample compared with a time in positions.
@@ -190,9 +190,9 @@ pub enum Truth {
     Lived(u64, Option<u64>),
 }
 
-impl Truth {
+impl TruthNode {
     /// What it is from `position` on.
-    pub fn value(&mut self, position: u64, held: &[Sample], numbers: &[f64], before: &[Grade]) -> Grade {
+    pub fn value(&mut self, position: u64, held: &[InputSample], numbers: &[f64], before: &[Grade]) -> Grade {
         match self {
             Self::Compare { left, op, right, hysteresis, holds } => {
                 let (left, right) = (numbers[*left], numbers[*right]);
@@ -225,7 +225,7 @@ impl Truth {
     }
 
     /// The next position at which it may change though nothing it is made of does.
-    pub fn next(&self, position: u64, held: &[Sample]) -> u64 {
+    pub fn next(&self, position: u64, held: &[InputSample]) -> u64 {
         match self {
             Self::Age { slot, op, bound, start: Some(start) } => {
                 // The bound is crossed at it, or right behind it.
@@ -276,7 +276,7 @@ impl Truth {
 }
 
 impl Number {
-    /// As [`Truth::next`].
+    /// As [`TruthNode::next`].
     pub fn next(&self, position: u64) -> u64 {
         match self {
             Self::Rate(_, rate) => rate.next(position),
@@ -284,14 +284,14 @@ impl Number {
         }
     }
 
-    /// As [`Truth::clear`].
+    /// As [`TruthNode::clear`].
     pub fn clear(&mut self) {
         if let Self::Rate(_, rate) = self {
             rate.clear();
         }
     }
 
-    /// As [`Truth::merged`].
+    /// As [`TruthNode::merged`].
     pub fn merged(&self) -> u64 {
         match self {
             Self::Rate(_, rate) => rate.merged,

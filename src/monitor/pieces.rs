@@ -1,13 +1,13 @@
 //! The pieces of a signal that may still become the largest in a sliding window.
 
 use super::grade::Grade;
-use super::ring::{Ring, grain};
+use super::ring::{RingBuffer, grain};
 
 /// Pieces from old to new; values fall from front to back, since a piece that is followed by a larger one can never be the
 /// largest again.
 #[derive(Debug, Clone)]
 pub struct Pieces {
-    ring: Ring<Piece>,
+    ring: RingBuffer<Piece>,
     most: usize,
     /// How far apart pieces may leave that become one when there is no room.
     grain: u64,
@@ -29,7 +29,7 @@ impl Pieces {
     /// merging makes the window too long where `upward`, else too short, by no more than [`grain`].
     pub fn new(most: usize, window: u64, upward: bool) -> Self {
         let most = most.max(2);
-        Self { ring: Ring::new(most), most, grain: grain(window, most), upward, merged: 0 }
+        Self { ring: RingBuffer::new(most), most, grain: grain(window, most), upward, merged: 0 }
     }
 
     /// Forgets everything but the count of what was merged.

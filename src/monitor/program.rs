@@ -1,14 +1,14 @@
 //! One condition, compiled: lists of numbers and truths, each made of those before it.
 
-use super::bank::Sample;
+use super::bank::InputSample;
 use super::grade::Grade;
-use super::nodes::{Number, Truth};
+use super::nodes::{Number, TruthNode};
 
 /// A condition with its history.
 #[derive(Debug, Clone)]
 pub struct CompiledCondition {
     numbers: Vec<Number>,
-    truths: Vec<Truth>,
+    truths: Vec<TruthNode>,
     values: Vec<f64>,
     grades: Vec<Grade>,
     /// Where the history is evaluated up to.
@@ -21,7 +21,7 @@ pub struct CompiledCondition {
 
 impl CompiledCondition {
     /// The last of the truths is the condition.
-    pub fn new(numbers: Vec<Number>, truths: Vec<Truth>) -> Self {
+    pub fn new(numbers: Vec<Number>, truths: Vec<TruthNode>) -> Self {
         let (values, grades) = (vec![f64::NAN; numbers.len()], vec![Grade::BOTTOM; truths.len()]);
         Self { numbers, truths, values, grades, position: 0, next: u64::MAX, wake: u64::MAX }
     }
@@ -29,13 +29,13 @@ impl CompiledCondition {
     /// Forgets the history.
     pub fn clear(&mut self) {
         self.numbers.iter_mut().for_each(Number::clear);
-        self.truths.iter_mut().for_each(Truth::clear);
+        self.truths.iter_mut().for_each(TruthNode::clear);
         self.next = u64::MAX;
         self.wake = u64::MAX;
     }
 
     /// What the condition is at `position`, which is after all before; in between nothing changed but by [`Self::next`].
-    pub fn evaluate(&mut self, position: u64, held: &[Sample]) -> Grade {
+    pub fn evaluate(&mut self, position: u64, held: &[InputSample]) -> Grade {
         let mut next = u64::MAX;
         for i in 0..self.numbers.len() {
             self.values[i] = self.numbers[i].value(position, held, &self.values[..i]);
@@ -49,7 +49,7 @@ impl CompiledCondition {
         let mut wake = next;
         for (i, truth) in self.truths.iter().enumerate() {
             // What rose is not rising any more right behind.
-            let (Truth::Rise(of, _) | Truth::Fall(of, _)) = truth else { continue };
+            let (TruthNode::Rise(of, _) | TruthNode::Fall(of, _)) = truth else { continue };
             let settled = self.grades[*of].and(self.grades[*of].contrary());
             if settled != self.grades[i] {
                 next = next.min(position + 1);
@@ -86,6 +86,6 @@ impl CompiledCondition {
 
     /// How many pieces were merged so far.
     pub fn merged(&self) -> u64 {
-        self.numbers.iter().map(Number::merged).sum::<u64>() + self.truths.iter().map(Truth::merged).sum::<u64>()
+        self.numbers.iter().map(Number::merged).sum::<u64>() + self.truths.iter().map(TruthNode::merged).sum::<u64>()
     }
 }

@@ -1,6 +1,6 @@
 //! Monitors over recorded samples.
 
-use super::bank::{Bank, Input, Sample, Troubles};
+use super::bank::{Bank, InputSample, MonitorInput, Troubles};
 use super::table::{Columns, TableProblem};
 use crate::limits::SAMPLES_WAKES;
 use crate::model::{EventName, Monitor};
@@ -15,7 +15,7 @@ pub struct Replay {
     /// Of each column, the inputs that it feeds.
     feeds: Vec<Vec<usize>>,
     wanted: Vec<bool>,
-    samples: Vec<Sample>,
+    samples: Vec<InputSample>,
     /// Of each input, the line that wrote it last.
     touched: Vec<u64>,
     tallies: Vec<Tally>,
@@ -42,7 +42,7 @@ pub struct Tally {
 
 /// An event that a monitor raised.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Raised {
+pub struct MonitorEvent {
     /// When.
     pub at: Time,
     /// The index of the monitor.
@@ -57,7 +57,7 @@ impl Replay {
     /// Monitors over a recording with these columns; `names` gives columns other names than they have in the file
     /// (signal, column). The inputs that no column feeds are answered beside it: their conditions would see
     /// nothing. What only monitors look at that are not enabled is not missed.
-    pub fn new(monitors: &[Monitor], columns: Columns, names: &[(String, String)]) -> (Self, Vec<Input>) {
+    pub fn new(monitors: &[Monitor], columns: Columns, names: &[(String, String)]) -> (Self, Vec<MonitorInput>) {
         let bank = Bank::new(monitors);
         let mut feeds = vec![Vec::new(); columns.names().len()];
         let mut missing = Vec::new();
@@ -71,7 +71,7 @@ impl Replay {
             }
             // Of a port that is only watched for coming, any part of it tells.
             let parts: Vec<usize> = match input {
-                Input::Port(port) if !bank.is_valued(i) => {
+                MonitorInput::Port(port) if !bank.is_valued(i) => {
                     let whole = port.member.to_string();
                     let is_part =
                         |name: &str| name.strip_prefix(&whole).is_some_and(|rest| rest.starts_with(['.', '[']));
@@ -85,7 +85,7 @@ impl Replay {
             parts.into_iter().for_each(|c| feeds[c].push(i));
         }
         let wanted = feeds.iter().map(|f| !f.is_empty()).collect();
-        let samples = vec![Sample::default(); bank.inputs().len()];
+        let samples = vec![InputSample::default(); bank.inputs().len()];
         let tallies = vec![Tally::default(); monitors.len()];
         let touched = vec![0; samples.len()];
         let (now, first_nan) = (None, None);
@@ -109,7 +109,7 @@ impl Replay {
     ///
     /// # Errors
     /// What is wrong with the line; nothing of it has been taken then.
-    pub fn line(&mut self, line: &str, raised: &mut dyn FnMut(Raised)) -> Result<(), TableProblem> {
+    pub fn line(&mut self, line: &str, raised: &mut dyn FnMut(MonitorEvent)) -> Result<(), TableProblem> {
         let mut fresh = Vec::new();
         let at = self.columns.line(line, &self.wanted, &mut |column, value| fresh.push((column, value)))?;
         // The history begins at the first line, not when the clock did.
@@ -134,14 +134,14 @@ impl Replay {
                 // Several columns of one port in one line are one sample of it.
                 let again = std::mem::replace(&mut self.touched[*input], self.lines) == self.lines;
                 let writes = sample.writes + u64::from(!again);
-                *sample = Sample { value, at, writes, present: true };
+                *sample = InputSample { value, at, writes, present: true };
             }
         }
         self.step(at, raised);
         Ok(())
     }
 
-    fn step(&mut self, now: Time, raised: &mut dyn FnMut(Raised)) {
+    fn step(&mut self, now: Time, raised: &mut dyn FnMut(MonitorEvent)) {
         let passed = self.now.map_or(Duration::ZERO, |before| now.since(before));
         for tally in self.tallies.iter_mut().filter(|t| t.verdict) {
             tally.total += passed;
@@ -164,7 +164,7 @@ impl Replay {
         }
         for (monitor, event) in events {
             let robustness = self.bank.robustness(monitor).unwrap_or(f64::NEG_INFINITY);
-            raised(Raised { at: now, monitor, event, robustness });
+            raised(MonitorEvent { at: now, monitor, event, robustness });
         }
         self.now = Some(now);
     }

@@ -6,19 +6,19 @@ use std::ops::{Deref, DerefMut};
 /// A queue of at most so many elements. A copy has taken its memory too, so that one made of a template at run time
 /// allocates nothing afterwards.
 #[derive(Debug)]
-pub struct Ring<T> {
+pub struct RingBuffer<T> {
     queue: VecDeque<T>,
     most: usize,
 }
 
-impl<T> Ring<T> {
+impl<T> RingBuffer<T> {
     /// An empty one, with the memory for `most` elements.
     pub fn new(most: usize) -> Self {
         Self { queue: VecDeque::with_capacity(most), most }
     }
 }
 
-impl<T: Copy> Ring<T> {
+impl<T: Copy> RingBuffer<T> {
     /// Makes room by joining neighbours, old to new, as long as `joined` answers what the two become; answers how many
     /// were joined. If none could be, the two oldest are, by `forced`.
     ///
@@ -52,7 +52,7 @@ pub fn grain(window: u64, most: usize) -> u64 {
     (window / most).saturating_add(1).saturating_mul(4)
 }
 
-impl<T: Clone> Clone for Ring<T> {
+impl<T: Clone> Clone for RingBuffer<T> {
     fn clone(&self) -> Self {
         let mut copy = Self::new(self.most);
         copy.queue.extend(self.queue.iter().cloned());
@@ -60,14 +60,14 @@ impl<T: Clone> Clone for Ring<T> {
     }
 }
 
-impl<T> Deref for Ring<T> {
+impl<T> Deref for RingBuffer<T> {
     type Target = VecDeque<T>;
     fn deref(&self) -> &VecDeque<T> {
         &self.queue
     }
 }
 
-impl<T> DerefMut for Ring<T> {
+impl<T> DerefMut for RingBuffer<T> {
     fn deref_mut(&mut self) -> &mut VecDeque<T> {
         &mut self.queue
     }

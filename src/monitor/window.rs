@@ -2,7 +2,7 @@
 
 use super::grade::Grade;
 use super::pieces::Pieces;
-use super::ring::{Ring, grain};
+use super::ring::{RingBuffer, grain};
 
 /// The largest value that a condition had from `oldest` to `newest` positions ago.
 #[derive(Debug, Clone)]
@@ -16,7 +16,7 @@ pub struct Window {
     /// Where the present value began, and whether that piece has entered the window; none before the first value.
     open: Option<(u64, Grade, bool)>,
     /// Closed pieces (first position, position after the last) that have not entered yet.
-    waiting: Ring<(u64, u64, Grade)>,
+    waiting: RingBuffer<(u64, u64, Grade)>,
     pieces: Pieces,
     most: usize,
     upward: bool,
@@ -32,7 +32,7 @@ impl Window {
             oldest,
             half_open,
             open: None,
-            waiting: Ring::new(if newest == 0 { 0 } else { most }),
+            waiting: RingBuffer::new(if newest == 0 { 0 } else { most }),
             pieces: Pieces::new(most, oldest, upward),
             most,
             upward,

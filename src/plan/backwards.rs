@@ -7,13 +7,13 @@ use super::{PlannedStep, StepId};
 use smallvec::SmallVec;
 
 /// Numbers of steps of a way back.
-pub type Waits = SmallVec<[StepId; 4]>;
+pub type Predecessors = SmallVec<[StepId; 4]>;
 
 /// A list of steps gone through from its end, and what the undo of each waits for.
 #[derive(Debug)]
 pub struct Backwards {
     /// By step.
-    waits: Vec<Waits>,
+    waits: Vec<Predecessors>,
     last_wave: u32,
 }
 
@@ -22,7 +22,7 @@ impl Backwards {
     pub fn of(steps: &[PlannedStep]) -> Self {
         // Waves never decrease along a list.
         let last_wave = steps.last().map_or(0, |step| step.wave);
-        Self { waits: steps.iter().map(|_| Waits::new()).collect(), last_wave }
+        Self { waits: steps.iter().map(|_| Predecessors::new()).collect(), last_wave }
     }
 
     /// The wave of the undo of a step: the last one's come first.
@@ -37,7 +37,7 @@ impl Backwards {
 
     /// What the undo of the step at place `i` waits for. All steps that wait for it have been [left](Self::leave) before.
     #[inline]
-    pub fn waits(&mut self, i: usize) -> Waits {
+    pub fn waits(&mut self, i: usize) -> Predecessors {
         let mut waits = std::mem::take(&mut self.waits[i]);
         if waits.len() > 1 {
             waits.sort_unstable();

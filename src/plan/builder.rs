@@ -2,7 +2,7 @@
 
 use super::footprint::{Footprint, Saved};
 use super::{
-    Context, Plan, PlanStage, PlannedStep, Refusal, SavedValue, StepId, changes, conflicts, lists, order, replace,
+    Plan, PlanContext, PlanStage, PlannedStep, Refusal, SavedValue, StepId, changes, conflicts, lists, order, replace,
 };
 use crate::model::codes;
 use crate::model::{Call, ChangeKind, ComponentName, Configuration, Finding, Findings, Origin, Step, Target};
@@ -13,7 +13,7 @@ use smallvec::SmallVec;
 pub(super) struct PlanBuilder<'o, 's, 'c> {
     pub(super) view: &'o mut Overlay<'s>,
     pub(super) configuration: &'c Configuration,
-    pub(super) context: &'c Context,
+    pub(super) context: &'c PlanContext,
     pub(super) stage: PlanStage,
     pub(super) steps: Vec<PlannedStep>,
     pub(super) footprint: Footprint,
@@ -24,7 +24,11 @@ pub(super) struct PlanBuilder<'o, 's, 'c> {
     pub(super) blamed: FxHashSet<ComponentName>,
 }
 
-pub(super) fn build(view: &mut Overlay<'_>, configuration: &Configuration, context: &Context) -> Result<Plan, Refusal> {
+pub(super) fn build(
+    view: &mut Overlay<'_>,
+    configuration: &Configuration,
+    context: &PlanContext,
+) -> Result<Plan, Refusal> {
     let mut findings = Vec::new();
     let replace::Expanded { configuration, replaced } = replace::expand(configuration, view, &mut findings);
     let configuration = configuration.as_ref();

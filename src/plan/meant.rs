@@ -1,11 +1,11 @@
 //! The step that a change means in a given system, its values fitted to what they are for. What `check` looks at and what
 //! is planned is the same.
 
-use super::Context;
+use super::PlanContext;
 use super::replace::renamed;
 use crate::model::finding::did_you_mean;
 use crate::model::{Call, ChangeKind, ComponentName, Ident, MemberRef, Step, TypeName, Value};
-use crate::system::{Member, View, Violation, step};
+use crate::system::{MemberClass, View, Violation, step};
 use std::collections::BTreeMap;
 
 /// What a change means.
@@ -22,7 +22,7 @@ pub struct Meant {
 
 impl Meant {
     /// What `kind` means in `view`.
-    pub fn of(kind: &ChangeKind, view: &impl View, context: &Context) -> Self {
+    pub fn of(kind: &ChangeKind, view: &impl View, context: &PlanContext) -> Self {
         let mut wrong = Vec::new();
         let mut named = None;
         let step = match kind {
@@ -109,8 +109,11 @@ fn initial(
     let values = values.collect();
     if used < given.len() {
         let unknown = given.keys().filter(|name| !declared.properties.contains_key(*name));
-        let lacking =
-            |member: MemberRef| Violation::UnknownMember { what: Member::Property, member, types: vec![declared.name] };
+        let lacking = |member: MemberRef| Violation::UnknownMember {
+            what: MemberClass::Property,
+            member,
+            types: vec![declared.name],
+        };
         wrong.extend(unknown.map(|name| lacking(component.member(*name))));
     }
     values

@@ -24,14 +24,14 @@ use std::collections::BTreeSet;
 
 /// What a configuration is judged by, beside the system (which knows its component types).
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Context {
+pub struct PlanContext {
     /// The deployment's activities.
     pub activities: BTreeSet<Ident>,
     /// Components that `_default` passes over: in quarantine, or not known well enough.
     pub avoid: BTreeSet<ComponentName>,
 }
 
-impl Context {
+impl PlanContext {
     /// That of a deployment's configurations.
     pub fn of(deployment: &Deployment) -> Self {
         Self { activities: deployment.activities.keys().copied().collect(), avoid: BTreeSet::new() }
@@ -141,7 +141,7 @@ impl Refusal {
 ///
 /// # Errors
 /// [`Refusal`] with all violations: nothing was changed, nothing will be.
-pub fn plan(system: &System, configuration: &Configuration, context: &Context) -> Result<Plan, Refusal> {
+pub fn plan(system: &System, configuration: &Configuration, context: &PlanContext) -> Result<Plan, Refusal> {
     plan_on(&mut Overlay::new(system), configuration, context)
 }
 
@@ -149,6 +149,6 @@ pub fn plan(system: &System, configuration: &Configuration, context: &Context) -
 ///
 /// # Errors
 /// [`Refusal`]; the overlay is then of no further use.
-pub fn plan_on(view: &mut Overlay<'_>, configuration: &Configuration, context: &Context) -> Result<Plan, Refusal> {
+pub fn plan_on(view: &mut Overlay<'_>, configuration: &Configuration, context: &PlanContext) -> Result<Plan, Refusal> {
     builder::build(view, configuration, context)
 }

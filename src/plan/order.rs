@@ -125,7 +125,7 @@ fn in_loop(view: &Overlay<'_>, mut names: Vec<ComponentName>, key: Transition) -
     release(&left, &mut waiting, &mut ready);
     while out.len() < total {
         let Some(Reverse((component, ty))) = ready.pop() else {
-            // The declarations themselves go in a circle: then the name decides.
+            // The declarations themselves go in a cycle: then the name decides.
             let ty = *waiting.iter().min_by_key(|(_, c)| c[0]).expect("something is left").0;
             ready.extend(waiting.remove(&ty).into_iter().flatten().map(|c| Reverse((c, ty))));
             continue;

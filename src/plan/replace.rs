@@ -4,7 +4,7 @@
 
 use super::conflicts::clash;
 use crate::model::{Change, ChangeKind, ComponentName, Configuration, Findings, Ident, MemberRef, Origin, TypeName};
-use crate::system::{Member, Overlay, View, Violation};
+use crate::system::{MemberClass, Overlay, View, Violation};
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -130,7 +130,8 @@ pub(super) fn renamed(
     let mut wrong = Vec::new();
     for (from, to) in map {
         let (before, after) = (component.member(*from), component.member(*to));
-        let lacking = |member, ty: TypeName| Violation::UnknownMember { what: Member::Port, member, types: vec![ty] };
+        let lacking =
+            |member, ty: TypeName| Violation::UnknownMember { what: MemberClass::Port, member, types: vec![ty] };
         match (old.ports.get(from), new.ports.get(to)) {
             (Some(one), Some(other)) => {
                 let units = one.unit.as_ref().zip(other.unit.as_ref());

@@ -1,6 +1,6 @@
 //! One clean example, then one deliberate breakage after the other, each with its exact finding.
 
-use super::{Context, Plan, PlanStage, PlannedStep, Refusal, irreversible, plan};
+use super::{Plan, PlanContext, PlanStage, PlannedStep, Refusal, irreversible, plan};
 use crate::model::*;
 use crate::system::{Reversibility, System, Undo, step};
 use std::collections::{BTreeMap, BTreeSet};
@@ -135,7 +135,7 @@ fn call(operation: &str, undo: Option<&str>) -> ChangeKind {
 }
 
 fn attempt(system: &System, conf: &Configuration) -> Result<Plan, Refusal> {
-    plan(system, conf, &Context { activities: BTreeSet::from([ident("fast")]), ..Context::default() })
+    plan(system, conf, &PlanContext { activities: BTreeSet::from([ident("fast")]), ..PlanContext::default() })
 }
 
 fn apply(system: &mut System, conf: &Configuration) -> Plan {

@@ -16,7 +16,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// A step to be simulated, with what the planner must know of it beyond the step.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Item {
+pub struct DraftStep {
     /// The step.
     pub step: Step,
     /// The call that undoes it, where it is an operation's and one is known.
@@ -31,7 +31,7 @@ pub struct Item {
     pub of: u32,
 }
 
-impl Item {
+impl DraftStep {
     /// The place of what was taken from no list.
     pub const NOWHERE: u32 = u32::MAX;
 
@@ -111,7 +111,7 @@ impl<'o, 's> Script<'o, 's> {
     ///
     /// # Errors
     /// The false preconditions.
-    pub fn add(&mut self, item: Item, wave: u32, after: &[StepId]) -> Result<Option<StepId>, Vec<Violation>> {
+    pub fn add(&mut self, item: DraftStep, wave: u32, after: &[StepId]) -> Result<Option<StepId>, Vec<Violation>> {
         let component = item.step.component();
         if self.leaves_out_gone && !matches!(item.step, Step::Create { .. }) {
             let gone = |name: &ComponentName| self.view.component(*name).is_none();
@@ -164,7 +164,7 @@ impl<'o, 's> Script<'o, 's> {
     ///
     /// # Errors
     /// The false preconditions.
-    pub fn add_left(&mut self, item: Item, wave: u32, after: &[StepId]) -> Result<Option<StepId>, Vec<Violation>> {
+    pub fn add_left(&mut self, item: DraftStep, wave: u32, after: &[StepId]) -> Result<Option<StepId>, Vec<Violation>> {
         let Step::PropertySet { property, value } = &item.step else { return self.add(item, wave, after) };
         let component = property.component;
         let Some(node) = self.view.component(component) else { return self.add(item, wave, after) };
@@ -180,7 +180,7 @@ impl<'o, 's> Script<'o, 's> {
             let mut last: SmallVec<[StepId; 1]> = SmallVec::from_slice(after);
             for transition in from.path_to(to) {
                 let step = Step::State { component, transition: *transition };
-                last = SmallVec::from_elem(script.push(Item::bare(step, stage, origin), wave, &last)?, 1);
+                last = SmallVec::from_elem(script.push(DraftStep::bare(step, stage, origin), wave, &last)?, 1);
             }
             Ok::<_, Vec<Violation>>(last)
         };
@@ -195,13 +195,13 @@ impl<'o, 's> Script<'o, 's> {
         let state = self.view.component(component).map_or(goal.into(), |n| n.state);
         for transition in state.path_to(goal) {
             let step = Step::State { component, transition: *transition };
-            self.push(Item::bare(step, stage, origin), wave, &[])?;
+            self.push(DraftStep::bare(step, stage, origin), wave, &[])?;
         }
         Ok(())
     }
 
     /// Cleans a failed component up when a property can be set only then.
-    fn clear_fault(&mut self, item: &Item, wave: u32) -> Result<(), Vec<Violation>> {
+    fn clear_fault(&mut self, item: &DraftStep, wave: u32) -> Result<(), Vec<Violation>> {
         let Step::PropertySet { property, .. } = &item.step else { return Ok(()) };
         let component = property.component;
         let Some(node) = self.view.component(component) else { return Ok(()) };
@@ -209,12 +209,12 @@ impl<'o, 's> Script<'o, 's> {
         if node.state == RunState::Faulted && !allowed {
             self.failed.insert(component);
             let step = Step::State { component, transition: Transition::Cleanup };
-            self.push(Item::bare(step, item.stage, item.origin), wave, &[])?;
+            self.push(DraftStep::bare(step, item.stage, item.origin), wave, &[])?;
         }
         Ok(())
     }
 
-    fn push(&mut self, item: Item, wave: u32, after: &[StepId]) -> Result<StepId, Vec<Violation>> {
+    fn push(&mut self, item: DraftStep, wave: u32, after: &[StepId]) -> Result<StepId, Vec<Violation>> {
         let found = step::precondition(&item.step, self.view);
         if !found.is_empty() {
             return Err(found);
@@ -249,7 +249,7 @@ impl<'o, 's> Script<'o, 's> {
             step.id += base;
             step.wave += wave;
             step.after.iter_mut().for_each(|id| *id += base);
-            self.of.push(Item::NOWHERE);
+            self.of.push(DraftStep::NOWHERE);
             self.steps.push(step);
         }
     }
@@ -336,7 +336,7 @@ pub fn undo(
             let kept = absolute(&done.step).and_then(|slot| by_slot.get(&slot)).and_then(|s| restoring(s));
             let steps = kept.as_ref().map_or_else(|| done.undo.steps(), std::slice::from_ref);
             for step in steps {
-                if let Some(id) = script.add(Item::undoing(step, done), wave, &last)? {
+                if let Some(id) = script.add(DraftStep::undoing(step, done), wave, &last)? {
                     last = SmallVec::from_slice(&[id]);
                 }
             }
@@ -357,26 +357,27 @@ fn restore(
     wave: u32,
 ) -> Result<(), Vec<Violation>> {
     if let (false, Some(step)) = (skip(saved.slot), restoring(saved)) {
-        script.add(Item::bare(step, PlanStage::Changes, Origin::NONE), wave, &[])?;
+        script.add(DraftStep::bare(step, PlanStage::Changes, Origin::NONE), wave, &[])?;
     }
     Ok(())
 }
 
 /// The same steps as a plain list, last first, every absolute write of `saved` among them (also those that restore what
 /// is there anyway).
-pub fn items(steps: &[PlannedStep], saved: &[SavedValue]) -> Vec<Item> {
+pub fn items(steps: &[PlannedStep], saved: &[SavedValue]) -> Vec<DraftStep> {
     let by_slot: FxHashMap<Slot, &SavedValue> = saved.iter().filter(|s| s.step).map(|s| (s.slot, s)).collect();
     let mut unwritten: Vec<&SavedValue> = saved.iter().filter(|s| !s.step).collect();
     unwritten.sort_by_key(|s| s.at);
     let mut list = Vec::with_capacity(steps.len() + unwritten.len());
-    let plain = |saved: &SavedValue| restoring(saved).map(|step| Item::bare(step, PlanStage::Changes, Origin::NONE));
+    let plain =
+        |saved: &SavedValue| restoring(saved).map(|step| DraftStep::bare(step, PlanStage::Changes, Origin::NONE));
     for (i, done) in steps.iter().enumerate().rev() {
         while unwritten.last().is_some_and(|s| s.at as usize > i) {
             list.extend(unwritten.pop().and_then(plain));
         }
         let kept = absolute(&done.step).and_then(|slot| by_slot.get(&slot)).and_then(|s| restoring(s));
         let steps = kept.as_ref().map_or_else(|| done.undo.steps(), std::slice::from_ref);
-        list.extend(steps.iter().map(|step| Item::undoing(step, done)));
+        list.extend(steps.iter().map(|step| DraftStep::undoing(step, done)));
     }
     list.extend(unwritten.into_iter().rev().filter_map(plain));
     list
@@ -402,7 +403,7 @@ pub fn in_order(system: &System, steps: Vec<Step>) -> Result<Vec<PlannedStep>, V
     let mut script = Script::new(&mut view);
     for step in steps {
         let after: SmallVec<[StepId; 1]> = script.steps.last().map(|s| s.id).into_iter().collect();
-        let item = Item::bare(step, PlanStage::Changes, Origin::NONE);
+        let item = DraftStep::bare(step, PlanStage::Changes, Origin::NONE);
         // Not through `add`: a difference knows what it does with failed components.
         script.push(item, 0, &after)?;
     }

@@ -3,27 +3,18 @@
 //! One trait, of blocking calls with deadlines, made from worker threads. Nothing assumes that a call is local, quick or
 //! answered: the same trait must fit components on other hosts and ROS 2 lifecycle nodes.
 
+mod batch;
 pub mod conformance;
 pub mod embedded;
 pub mod simulated;
 
 pub use crate::model::outcome::{Cause, Execution, Outcome};
 use crate::model::{ActivityStatus, Catalogue, ComponentName, ComponentSnapshot, EventName, Snapshot, Step, Value};
-use crate::monitor::{Input, Sample};
+use crate::monitor::{InputSample, MonitorInput};
 use crate::time::{Signal, Time};
+pub use batch::{StepBatch, TimedOutcome, TimedStep};
 use std::collections::BTreeSet;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
-use std::time::Duration;
-
-/// How one of several steps ended.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Ended {
-    /// How.
-    pub outcome: Outcome,
-    /// How long it took, where the platform has measured it.
-    pub took: Option<Duration>,
-}
 
 /// What a platform reports by itself.
 #[derive(Debug, Clone, PartialEq)]
@@ -78,6 +69,14 @@ pub trait Platform: Send + Sync {
     /// Whether a step is immediate or blocking here.
     fn execution(&self, step: &Step) -> Execution;
 
+    /// Whether a blocking step is better carried out in one call with others, one after the other, than in a call of its own
+    /// beside them: it hardly takes time, or the way there and back takes most of it. Never asked of operations, which may
+    /// take long and may be given up: each has a call of its own.
+    fn batches(&self, step: &Step) -> bool {
+        let _ = step;
+        false
+    }
+
     /// Carries out one step. Returns by `deadline` (a little later at most), whatever the component does.
     /// Checks its own precondition: a step that does not fit what is there is refused and changes nothing.
     fn execute(&self, step: &Step, deadline: Time) -> Outcome;
@@ -104,18 +103,23 @@ pub trait Platform: Send + Sync {
     ///
     /// Until then the component begins no other operation, except those that run beside its activity, and those of
     /// [`Platform::execute_safe`]. Only operations can be told; making, dropping and moving between run states goes on to
-    /// its end once it has begun.
+    /// its end once it has begun. Of a batch that is to stop every step that was taken and is not answered is given up so, but
+    /// the first: what has not begun never will.
     fn cancel(&self, step: &Step);
 
-    /// Carries out brief steps, none of which needs another one, in their order: each has `each` from its beginning, and
-    /// `until` at most. Begins no further one after one that is not done, nor after
-    /// `limits::BRIEF_TURN` (10 ms), nor once `stop` is set. Answers for those that were begun, at least one;
-    /// the others did not happen.
+    /// Carries out blocking steps: every call that a worker makes is this one, with one step or with several that
+    /// [`Platform::batches`] says so of. They are carried out in their order, each by its own deadline from its beginning
+    /// on, and answered one by one as they end. Behind one that is not done none begins, nor once the batch is stopped. Who
+    /// returns before all have begun gives the others back: they did not happen.
     ///
-    /// A platform that calls steps brief carries out several; by itself this carries out the first.
-    fn execute_brief(&self, steps: Vec<Step>, each: Duration, until: Time, stop: &Arc<AtomicBool>) -> Vec<Ended> {
-        let _ = (each, stop);
-        steps.iter().take(1).map(|step| Ended { outcome: self.execute(step, until), took: None }).collect()
+    /// By itself this carries out one after the other. A platform far away takes all that may begin ([`StepBatch::begin`]), sends
+    /// them in one message with the time that each may take, and answers as the answers come; what it has sent and hears nothing of
+    /// any more is unknown, each of them.
+    fn execute_batch(&self, batch: &StepBatch) {
+        batch.one_by_one(|step, deadline| match batch.is_safe() {
+            true => self.execute_safe(step, deadline),
+            false => self.execute(step, deadline),
+        });
     }
 
     /// The whole system as it is.
@@ -161,7 +165,7 @@ pub trait Platform: Send + Sync {
     /// Looks at what conditions are about, beside all connections; of ports, at what is written from now on and at nothing
     /// before. Whenever something is written there, `wake` is notified; whoever looks also does so after each step, and
     /// when a component was reported. Never waits. None: this platform shows no values at all.
-    fn watch(&self, inputs: &[Input], wake: &Signal) -> Option<Box<dyn Watch>> {
+    fn watch(&self, inputs: &[MonitorInput], wake: &Signal) -> Option<Box<dyn Watch>> {
         let _ = (inputs, wake);
         None
     }
@@ -195,5 +199,5 @@ pub trait Watch: Send {
     fn shows(&self, input: usize) -> bool;
 
     /// The newest samples, in the order of the inputs. What is not there is absent.
-    fn look(&mut self, now: Time, samples: &mut [Sample]);
+    fn look(&mut self, now: Time, samples: &mut [InputSample]);
 }

@@ -3,8 +3,8 @@
 //! An activity shares with the configurator atomic words, a signal, a queue of operations and the latest list of its
 //! components, and no lock.
 
-use super::call::{Call, Reply};
-use super::cell::{Cell, Inside};
+use super::call::{Reply, Responder};
+use super::cell::{Cell, CellGuard};
 use super::gate::Closed;
 use super::latest::Reader;
 use crate::limits;
@@ -20,11 +20,11 @@ use std::time::Duration;
 pub(crate) type Schedule = Arc<[Arc<Cell>]>;
 
 /// An operation to be run in the activity's thread.
-pub(crate) struct Request {
+pub(crate) struct OperationJob {
     pub(crate) cell: Arc<Cell>,
     pub(crate) operation: usize,
     pub(crate) args: Vec<Value>,
-    pub(crate) call: Call,
+    pub(crate) call: Responder,
     /// It does not wait until a call that was given up has come to rest.
     pub(crate) safe: bool,
 }
@@ -43,7 +43,7 @@ struct Counters {
 /// What is done with a component that was put in quarantine and has come back.
 pub(crate) type LateCall = Box<dyn Fn(&Arc<Cell>) + Send + Sync>;
 
-pub(crate) struct Activity {
+pub(crate) struct ActivityThread {
     pub(crate) name: Ident,
     spec: Spec,
     clock: Clock,
@@ -60,7 +60,7 @@ pub(crate) struct Activity {
     late: LateCall,
 }
 
-impl Activity {
+impl ActivityThread {
     pub(crate) fn new(name: Ident, spec: Spec, clock: &Clock, late: LateCall) -> Self {
         Self {
             name,
@@ -145,7 +145,7 @@ impl Activity {
     }
 
     /// The thread.
-    pub(crate) fn run(&self, mut schedule: Reader<Schedule>, requests: &Receiver<Request>) {
+    pub(crate) fn run(&self, mut schedule: Reader<Schedule>, requests: &Receiver<OperationJob>) {
         if !self.clock.is_simulated() {
             *crate::time::lock(&self.complaint) = super::realtime::apply(self.spec.priority, self.spec.cpu);
         }
@@ -156,7 +156,7 @@ impl Activity {
     }
 
     /// Serves what is asked, and waits while nothing runs. False: the thread is to end.
-    fn attend(&self, requests: &Receiver<Request>, held: &mut VecDeque<Request>) -> bool {
+    fn attend(&self, requests: &Receiver<OperationJob>, held: &mut VecDeque<OperationJob>) -> bool {
         loop {
             if self.ended.load(Ordering::SeqCst) {
                 return false;
@@ -176,7 +176,7 @@ impl Activity {
         }
     }
 
-    fn run_periodic(&self, period: Duration, schedule: &mut Reader<Schedule>, requests: &Receiver<Request>) {
+    fn run_periodic(&self, period: Duration, schedule: &mut Reader<Schedule>, requests: &Receiver<OperationJob>) {
         let step = u64::try_from(period.as_nanos()).unwrap_or(u64::MAX);
         let mut release = self.clock.now();
         let mut held = VecDeque::new();
@@ -197,7 +197,7 @@ impl Activity {
             self.counters.latency_last.store(nanos(late), Ordering::Relaxed);
             self.counters.latency_max.fetch_max(nanos(late), Ordering::Relaxed);
             self.round(now, schedule, |cell| {
-                if let Some(inside) = Inside::running(cell) {
+                if let Some(inside) = CellGuard::running(cell) {
                     self.update(cell, inside, now, release, period.as_secs_f64());
                 }
             });
@@ -212,7 +212,7 @@ impl Activity {
         }
     }
 
-    fn run_on_events(&self, schedule: &mut Reader<Schedule>, requests: &Receiver<Request>) {
+    fn run_on_events(&self, schedule: &mut Reader<Schedule>, requests: &Receiver<OperationJob>) {
         let mut restless = 0;
         let mut held = VecDeque::new();
         loop {
@@ -226,7 +226,7 @@ impl Activity {
                 let pending = cell.beat.pending.load(Ordering::Acquire);
                 if !pending && wake_at > now {
                     next = next.min(wake_at);
-                } else if let Some(inside) = Inside::running(cell) {
+                } else if let Some(inside) = CellGuard::running(cell) {
                     any = true;
                     // An exchange, not a store: what was written before the last poke must be seen by this update, and a
                     // poke after it must stay.
@@ -265,14 +265,14 @@ impl Activity {
     }
 
     #[inline]
-    fn update(&self, cell: &Arc<Cell>, mut inside: Inside<'_>, now: Time, release: Time, first: f64) {
+    fn update(&self, cell: &Arc<Cell>, mut inside: CellGuard<'_>, now: Time, release: Time, first: f64) {
         let fault = inside.update(&self.clock, now, release, first).err();
         self.leave(cell, inside, fault);
     }
 
     /// Serves a request, or keeps it back: until its component has come to rest from a call that was given up, it begins no
     /// other; and requests of one component keep their order.
-    fn admit(&self, request: Request, held: &mut VecDeque<Request>) {
+    fn admit(&self, request: OperationJob, held: &mut VecDeque<OperationJob>) {
         let waits = !request.safe
             && (request.cell.is_restless() || held.iter().any(|other| Arc::ptr_eq(&other.cell, &request.cell)));
         if !waits {
@@ -285,7 +285,7 @@ impl Activity {
     }
 
     /// What was kept back and may be served now.
-    fn take_up(&self, held: &mut VecDeque<Request>) {
+    fn take_up(&self, held: &mut VecDeque<OperationJob>) {
         if held.is_empty() {
             return;
         }
@@ -296,14 +296,14 @@ impl Activity {
         }
     }
 
-    fn serve(&self, request: Request) {
-        let Request { cell, operation, args, call, safe } = request;
+    fn serve(&self, request: OperationJob) {
+        let OperationJob { cell, operation, args, call, safe } = request;
         let progress = call.0.clone();
         if !progress.begin() {
             return;
         }
         self.busy_since.store(self.clock.now().0, Ordering::Release);
-        match Inside::for_operation(&*cell, safe) {
+        match CellGuard::for_operation(&*cell, safe) {
             Ok(mut inside) => {
                 let mut ended = inside.operation(&self.clock, operation, &args, call);
                 progress.returned();
@@ -322,7 +322,7 @@ impl Activity {
     }
 
     #[inline]
-    fn leave(&self, cell: &Arc<Cell>, inside: Inside<'_>, fault: Option<String>) {
+    fn leave(&self, cell: &Arc<Cell>, inside: CellGuard<'_>, fault: Option<String>) {
         let left = inside.leave(fault.is_some().then_some(RunState::Faulted));
         if left.ended_running {
             self.stopped(cell);

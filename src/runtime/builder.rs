@@ -5,7 +5,7 @@
 
 use super::beat::Beat;
 use super::call::Reply;
-use super::component::{Answer, Arguments, Component, Context, HookResult, Returned};
+use super::component::{Arguments, Component, Context, HookResult, OperationAnswer, Returned};
 use super::port::{EventIn, EventOut, In, InEnd, Out, OutEnd};
 use super::probe::{Observed, Probes, ProbesEnd};
 use super::property::{Prop, PropEnd};
@@ -296,7 +296,7 @@ impl<C: Component> Builder<C> {
     pub fn operation<A: Arguments, R: Returned>(
         &mut self,
         name: &str,
-        f: impl Fn(&mut C, &mut Context, A) -> Answer<R> + Send + Sync + 'static,
+        f: impl Fn(&mut C, &mut Context, A) -> OperationAnswer<R> + Send + Sync + 'static,
     ) -> &mut Self {
         if let BuilderMode::Describe(d) = &mut self.mode {
             let erased: OperationFn<C> = Box::new(move |component, cx, args| {
@@ -304,9 +304,9 @@ impl<C: Component> Builder<C> {
                     return Some(Reply::Refused("an argument does not fit".to_owned()));
                 };
                 match f(component, cx, args) {
-                    Answer::Done(value) => Some(Reply::Done(value.into_value())),
-                    Answer::Failed(text) => Some(Reply::Failed(text)),
-                    Answer::Pending => None,
+                    OperationAnswer::Done(value) => Some(Reply::Done(value.into_value())),
+                    OperationAnswer::Failed(text) => Some(Reply::Failed(text)),
+                    OperationAnswer::Pending => None,
                 }
             });
             d.operation(name, A::types(), R::value_type(), Some(erased));
@@ -315,22 +315,22 @@ impl<C: Component> Builder<C> {
     }
 
     /// An operation that runs in the caller's thread, also while the component is updated: it answers for its own
-    /// synchronisation, and so gets nothing but what it captures. It never answers [`Answer::Pending`], and is not told when
+    /// synchronisation, and so gets nothing but what it captures. It never answers [`OperationAnswer::Pending`], and is not told when
     /// it is given up: it should be short. A brake is written so: called from a `safe` configuration it waits for nothing
     /// that the component does, not even in quarantine.
     pub fn caller_operation<A: Arguments, R: Returned>(
         &mut self,
         name: &str,
-        f: impl Fn(A) -> Answer<R> + Send + Sync + 'static,
+        f: impl Fn(A) -> OperationAnswer<R> + Send + Sync + 'static,
     ) -> &mut Self {
         match &mut self.mode {
             BuilderMode::Describe(d) => d.operation(name, A::types(), R::value_type(), None),
             BuilderMode::Make(m) => {
                 let erased: CallerFn = Arc::new(move |args| match A::from_values(args).map(&f) {
                     None => Reply::Refused("an argument does not fit".to_owned()),
-                    Some(Answer::Done(value)) => Reply::Done(value.into_value()),
-                    Some(Answer::Failed(text)) => Reply::Failed(text),
-                    Some(Answer::Pending) => Reply::Failed("it cannot answer later".to_owned()),
+                    Some(OperationAnswer::Done(value)) => Reply::Done(value.into_value()),
+                    Some(OperationAnswer::Failed(text)) => Reply::Failed(text),
+                    Some(OperationAnswer::Pending) => Reply::Failed("it cannot answer later".to_owned()),
                 });
                 m.made.callers.push((ident(name), erased));
             }

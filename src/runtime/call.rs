@@ -32,7 +32,7 @@ const TOLD: u8 = 8;
 const ANSWERED: u8 = 16;
 
 /// How far a call has come.
-pub(crate) struct Progress {
+pub(crate) struct CallProgress {
     bits: AtomicU8,
     reply: Sender<Reply>,
     /// The component that begins nothing else until this call has come to rest, once it was given up; none: the call runs
@@ -42,7 +42,7 @@ pub(crate) struct Progress {
     wake: Option<Signal>,
 }
 
-impl Progress {
+impl CallProgress {
     pub(crate) fn new(reply: Sender<Reply>, holds: Option<Arc<Beat>>, wake: Option<Signal>) -> Self {
         Self { bits: AtomicU8::new(0), reply, holds, wake }
     }
@@ -129,9 +129,9 @@ impl Progress {
 }
 
 /// The answering end of a call: dropped unanswered, the call failed.
-pub(crate) struct Call(pub(crate) Arc<Progress>);
+pub(crate) struct Responder(pub(crate) Arc<CallProgress>);
 
-impl Drop for Call {
+impl Drop for Responder {
     fn drop(&mut self) {
         self.0.answer(Reply::Failed("the component ended before it answered".to_owned()));
     }

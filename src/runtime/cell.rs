@@ -1,11 +1,11 @@
 //! A component in its place, behind its gate.
 
 use super::beat::Beat;
-use super::call::{Call, Progress, Reply};
+use super::call::{CallProgress, Reply, Responder};
 use super::component::{Context, HookResult};
 use super::gate::{self, Gate, Gated};
 use super::guard;
-use super::library::{Body, Kind};
+use super::library::{Body, ComponentFactory};
 use crate::model::{ComponentName, RunState, Transition, Value};
 use crate::time::{Clock, Time};
 use std::sync::Arc;
@@ -14,7 +14,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// A component and its gate.
 pub(crate) struct Cell {
     pub(crate) name: ComponentName,
-    pub(crate) kind: Arc<Kind>,
+    pub(crate) kind: Arc<ComponentFactory>,
     pub(crate) beat: Arc<Beat>,
     /// The component; none: it was taken out for good.
     pub(crate) gate: Gate<Option<Box<dyn Body>>>,
@@ -33,10 +33,10 @@ unsafe impl Gated for Cell {
 }
 
 /// The right to touch a component.
-pub(crate) type Inside<'a> = gate::Inside<'a, Cell>;
+pub(crate) type CellGuard<'a> = gate::GateGuard<'a, Cell>;
 
 impl Cell {
-    pub(crate) fn new(kind: Arc<Kind>, beat: Arc<Beat>, body: Box<dyn Body>) -> Self {
+    pub(crate) fn new(kind: Arc<ComponentFactory>, beat: Arc<Beat>, body: Box<dyn Body>) -> Self {
         Self { name: beat.name, kind, beat, gate: Gate::new(Some(body)), last: AtomicU64::new(Time::NEVER.0) }
     }
 
@@ -68,17 +68,17 @@ impl Cell {
 }
 
 /// How the call of an operation ended.
-pub(crate) struct Ended {
+pub(crate) struct CallEnded {
     /// Why the component is faulted, if it is.
     pub(crate) fault: Option<String>,
     /// None: the answer comes later.
     reply: Option<Reply>,
-    to: Arc<Progress>,
+    to: Arc<CallProgress>,
     /// The answering end, where no ticket has it: it answers by itself when it is dropped, so not before the answer.
-    _call: Option<Call>,
+    _call: Option<Responder>,
 }
 
-impl Ended {
+impl CallEnded {
     pub(crate) fn answer(self) {
         if let Some(reply) = self.reply {
             self.to.answer(reply);
@@ -86,7 +86,7 @@ impl Ended {
     }
 }
 
-impl Inside<'_> {
+impl CellGuard<'_> {
     /// Takes the component out for good.
     pub(crate) fn take(&mut self) -> Option<Box<dyn Body>> {
         self.with(|_, body| body.take())
@@ -122,8 +122,8 @@ impl Inside<'_> {
         })
     }
 
-    /// Calls an operation. Its answer is sent by [`Ended::answer`], after leaving: who hears it may call again at once.
-    pub(crate) fn operation(&mut self, clock: &Clock, index: usize, args: &[Value], call: Call) -> Ended {
+    /// Calls an operation. Its answer is sent by [`CallEnded::answer`], after leaving: who hears it may call again at once.
+    pub(crate) fn operation(&mut self, clock: &Clock, index: usize, args: &[Value], call: Responder) -> CallEnded {
         self.with(|cell, body| operate(cell, body.as_mut(), clock, index, args, call))
     }
 }
@@ -134,8 +134,8 @@ fn operate(
     clock: &Clock,
     index: usize,
     args: &[Value],
-    call: Call,
-) -> Ended {
+    call: Responder,
+) -> CallEnded {
     cell.beat.set_now(clock.now());
     let to = call.0.clone();
     let mut cx = Context::of_call(clock, &cell.beat, call);
@@ -151,5 +151,5 @@ fn operate(
         }
         Ok(reply) => (reply, cx.fault.take()),
     };
-    Ended { fault, reply, to, _call: call }
+    CallEnded { fault, reply, to, _call: call }
 }

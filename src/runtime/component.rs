@@ -2,7 +2,7 @@
 
 use super::beat::Beat;
 use super::builder::Builder;
-use super::call::{Call, Progress, Reply};
+use super::call::{CallProgress, Reply, Responder};
 use super::value::PortValue;
 use crate::model::{ComponentName, EventName, Value, ValueType};
 use crate::time::{Clock, Time};
@@ -75,7 +75,7 @@ pub type HookResult = Result<(), Failure>;
 
 /// What an operation answers.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Answer<R = ()> {
+pub enum OperationAnswer<R = ()> {
     /// Done, with its result.
     Done(R),
     /// Not done, and nothing changed.
@@ -84,14 +84,14 @@ pub enum Answer<R = ()> {
     Pending,
 }
 
-impl<R> Answer<R> {
+impl<R> OperationAnswer<R> {
     /// Not done.
     pub fn failed(text: impl Into<String>) -> Self {
         Self::Failed(text.into())
     }
 }
 
-impl<R> From<Result<R, Failure>> for Answer<R> {
+impl<R> From<Result<R, Failure>> for OperationAnswer<R> {
     fn from(result: Result<R, Failure>) -> Self {
         match result {
             Ok(value) => Self::Done(value),
@@ -158,7 +158,7 @@ arguments! { () (A) (A, B) (A, B, C) (A, B, C, D) (A, B, C, D, E) (A, B, C, D, E
 /// [`Ticket::is_cancelled`] in each update; when it says so, come to rest (what moves, holds where it is) and drop the
 /// ticket. Until then the component begins no other operation; see `Platform::cancel` for what the call then counts as.
 pub struct Ticket<R = ()> {
-    call: Option<Call>,
+    call: Option<Responder>,
     returned: PhantomData<fn(R)>,
 }
 
@@ -200,9 +200,9 @@ pub struct Context<'a> {
     dt: f64,
     first: bool,
     pub(crate) fault: Option<String>,
-    call: Option<Call>,
+    call: Option<Responder>,
     /// The call that this is, if it is one of an operation.
-    progress: Option<Arc<Progress>>,
+    progress: Option<Arc<CallProgress>>,
 }
 
 impl<'a> Context<'a> {
@@ -211,13 +211,13 @@ impl<'a> Context<'a> {
         Self { clock, beat, dt, first, fault: None, call: None, progress: None }
     }
 
-    pub(crate) fn of_call(clock: &'a Clock, beat: &'a Arc<Beat>, call: Call) -> Self {
+    pub(crate) fn of_call(clock: &'a Clock, beat: &'a Arc<Beat>, call: Responder) -> Self {
         let progress = Some(call.0.clone());
         Self { call: Some(call), progress, ..Self::new(clock, beat, 0.0, false) }
     }
 
     /// The answering end, unless a ticket has it.
-    pub(crate) fn take_call(&mut self) -> Option<Call> {
+    pub(crate) fn take_call(&mut self) -> Option<Responder> {
         self.call.take()
     }
 
@@ -270,7 +270,7 @@ impl<'a> Context<'a> {
         self.progress.as_ref().is_some_and(|progress| progress.is_told())
     }
 
-    /// Inside an operation: the means to answer later. The operation then answers [`Answer::Pending`].
+    /// Inside an operation: the means to answer later. The operation then answers [`OperationAnswer::Pending`].
     pub fn ticket<R: Returned>(&mut self) -> Ticket<R> {
         Ticket { call: self.call.take(), returned: PhantomData }
     }

@@ -1,7 +1,7 @@
 //! The gate of a component: one atomic word that says its run state and who may touch it.
 //!
 //! Its `BUSY` bit is a lock that is only ever *tried*: an activity enters components that run, everybody else only components
-//! that do not, so a control activity never meets anybody. Who has set the bit is [`Inside`], and touches what is behind the
+//! that do not, so a control activity never meets anybody. Who has set the bit is [`GateGuard`], and touches what is behind the
 //! gate; nobody else does.
 
 use super::sync::{Arc, AtomicU32, Ordering, UnsafeCell};
@@ -27,7 +27,7 @@ pub(crate) struct Gate<T> {
     behind: UnsafeCell<T>,
 }
 
-// SAFETY: what is behind is touched only through an `Inside`, and at any time there is one `Inside` of a gate at most: only who
+// SAFETY: what is behind is touched only through a `GateGuard`, and at any time there is one `GateGuard` of a gate at most: only who
 // has set `BUSY` has one, and who sets it sees (acquire) what the one before did (release). So several threads may share the
 // gate, though each touches what is behind it alone, and that goes from one to the next: it must be `Send`. The word is `Sync`
 // by itself.
@@ -182,7 +182,7 @@ impl<T> Gate<T> {
 
 /// How a visit ended for who was visited.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Left {
+pub(crate) struct VisitOutcome {
     /// It was running and does not any more.
     pub(crate) ended_running: bool,
     /// It had been put in quarantine meanwhile: somebody must clean it up.
@@ -195,13 +195,13 @@ enum GateOf<'a, G> {
 }
 
 /// The right to touch what is behind a gate: whoever has it has set `BUSY`. Dropped, it leaves.
-pub(crate) struct Inside<'a, G: Gated> {
+pub(crate) struct GateGuard<'a, G: Gated> {
     of: GateOf<'a, G>,
     /// Whether the gate is left as it is when this is dropped.
     over: bool,
 }
 
-impl<'a, G: Gated> Inside<'a, G> {
+impl<'a, G: Gated> GateGuard<'a, G> {
     /// For who has just set `BUSY`, and nobody else: dropped, it takes the bit back.
     #[inline]
     fn lent(of: &'a G) -> Self {
@@ -233,10 +233,10 @@ impl<'a, G: Gated> Inside<'a, G> {
     }
 
     /// The same right, to be taken to another thread. Dropped there unused, it leaves all the same.
-    pub(crate) fn sent(mut self, with: &Arc<G>) -> Inside<'static, G> {
+    pub(crate) fn sent(mut self, with: &Arc<G>) -> GateGuard<'static, G> {
         assert!(std::ptr::eq(self.at(), &raw const **with), "the right is one of another gate");
         self.over = true;
-        Inside { of: GateOf::Shared(with.clone()), over: false }
+        GateGuard { of: GateOf::Shared(with.clone()), over: false }
     }
 
     #[inline]
@@ -257,7 +257,7 @@ impl<'a, G: Gated> Inside<'a, G> {
 
     /// Leaves, in another state if one is given.
     #[inline]
-    pub(crate) fn leave(mut self, state: Option<RunState>) -> Left {
+    pub(crate) fn leave(mut self, state: Option<RunState>) -> VisitOutcome {
         self.over = true;
         let before = self
             .at()
@@ -266,7 +266,7 @@ impl<'a, G: Gated> Inside<'a, G> {
                 Ok((state.map_or(word & (CONFIGURED | RUN | FAULTED), bits_of)) | (word & (QUARANTINED | KEPT)))
             })
             .unwrap_or_default();
-        Left {
+        VisitOutcome {
             ended_running: before & RUN != 0 && matches!(state, Some(s) if s != RunState::Running),
             quarantined: before & QUARANTINED != 0,
         }
@@ -278,7 +278,7 @@ impl<'a, G: Gated> Inside<'a, G> {
     }
 }
 
-impl<G: Gated> Drop for Inside<'_, G> {
+impl<G: Gated> Drop for GateGuard<'_, G> {
     #[inline]
     fn drop(&mut self) {
         if !self.over {

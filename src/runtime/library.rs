@@ -51,7 +51,7 @@ pub(crate) struct MadeComponent {
 type Maker = Box<dyn Fn(&Arc<Beat>, Vec<Value>) -> Result<MadeComponent, String> + Send + Sync>;
 
 /// A component type that this program can make.
-pub struct Kind {
+pub struct ComponentFactory {
     /// Its description.
     pub ty: Arc<ComponentType>,
     /// Which transitions call the component's own code; the others are immediate.
@@ -65,13 +65,13 @@ pub struct Kind {
     make: Maker,
 }
 
-impl std::fmt::Debug for Kind {
+impl std::fmt::Debug for ComponentFactory {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "Kind({})", self.ty.name)
     }
 }
 
-impl Kind {
+impl ComponentFactory {
     /// The type that `C` declares, under a name.
     ///
     /// # Panics
@@ -85,7 +85,7 @@ impl Kind {
     /// declare the same members each time.
     ///
     /// # Panics
-    /// As [`Kind::of`].
+    /// As [`ComponentFactory::of`].
     pub fn made_by<C: Component>(name: &str, new: impl Fn(&mut Builder<C>) -> C + Send + Sync + 'static) -> Self {
         let (ty, table) = Builder::<C>::describe_type(name, &new);
         let table = Arc::new(table);
@@ -107,7 +107,7 @@ impl Kind {
         Self { immediate: true, ..self }
     }
 
-    /// Whether [`Kind::immediate`] was promised.
+    /// Whether [`ComponentFactory::immediate`] was promised.
     pub fn is_immediate(&self) -> bool {
         self.immediate
     }
@@ -131,7 +131,7 @@ impl Kind {
 #[derive(Debug, Clone)]
 pub struct Library {
     name: Ident,
-    kinds: Vec<Arc<Kind>>,
+    kinds: Vec<Arc<ComponentFactory>>,
 }
 
 impl Library {
@@ -149,7 +149,7 @@ impl Library {
     /// When the declaration is wrong: a name that is none, a member twice, a default outside its own limits.
     #[must_use]
     pub fn with<C: Component>(mut self, type_name: &str) -> Self {
-        self.kinds.push(Arc::new(Kind::of::<C>(type_name)));
+        self.kinds.push(Arc::new(ComponentFactory::of::<C>(type_name)));
         self
     }
 
@@ -160,12 +160,12 @@ impl Library {
     /// When the declaration is wrong: a name that is none, a member twice, a default outside its own limits.
     #[must_use]
     pub fn with_immediate<C: Component>(self, type_name: &str) -> Self {
-        self.with_kind(Kind::of::<C>(type_name).immediate())
+        self.with_kind(ComponentFactory::of::<C>(type_name).immediate())
     }
 
     /// With a component type that was made before.
     #[must_use]
-    pub fn with_kind(mut self, kind: Kind) -> Self {
+    pub fn with_kind(mut self, kind: ComponentFactory) -> Self {
         self.kinds.push(Arc::new(kind));
         self
     }
@@ -176,7 +176,7 @@ impl Library {
     }
 
     /// Its types.
-    pub fn kinds(&self) -> &[Arc<Kind>] {
+    pub fn kinds(&self) -> &[Arc<ComponentFactory>] {
         &self.kinds
     }
 
@@ -237,7 +237,7 @@ impl Libraries {
     }
 
     /// All types by name.
-    pub(crate) fn kinds(&self) -> FxHashMap<TypeName, Arc<Kind>> {
+    pub(crate) fn kinds(&self) -> FxHashMap<TypeName, Arc<ComponentFactory>> {
         self.0.iter().flat_map(|library| &library.kinds).map(|kind| (kind.ty.name, kind.clone())).collect()
     }
 }

@@ -4,7 +4,7 @@
 //! list, and leaves what it no longer needs in an outbox, where the configurator picks it up. So no thread ever waits for
 //! another, and the owner neither allocates nor frees: nodes are made and dropped by the configurator.
 //!
-//! There is one owner and, at a time, one configurator (the embedded platform's registry lock sees to it; [`Sender`] needs
+//! There is one owner and, at a time, one configurator (the embedded platform's registry lock sees to it; [`LinksSender`] needs
 //! `&mut`).
 
 use super::sync::{Arc, AtomicPtr, Ordering};
@@ -60,7 +60,7 @@ impl<L> Drop for Boxes<L> {
 }
 
 /// The configurator's side.
-pub struct Sender<L>(Arc<Boxes<L>>);
+pub struct LinksSender<L>(Arc<Boxes<L>>);
 
 /// The owner's side.
 pub struct Links<L> {
@@ -69,12 +69,12 @@ pub struct Links<L> {
 }
 
 /// An empty list.
-pub fn links<L>() -> (Sender<L>, Links<L>) {
+pub fn links<L>() -> (LinksSender<L>, Links<L>) {
     let boxes = Arc::new(Boxes { inbox: AtomicPtr::new(null_mut()), outbox: AtomicPtr::new(null_mut()) });
-    (Sender(boxes.clone()), Links { boxes, first: None })
+    (LinksSender(boxes.clone()), Links { boxes, first: None })
 }
 
-impl<L> Sender<L> {
+impl<L> LinksSender<L> {
     /// Adds a link at the end of the list.
     pub fn add(&mut self, id: u64, link: L) {
         self.order(Box::new(ChainNode { next: None, id, link: Some(link) }));

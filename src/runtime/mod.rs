@@ -1,7 +1,7 @@
 //! The embedded component runtime (semantics: *Platforms*): components as Rust types in this process.
 //!
 //! For those who write components: [`Component`], [`Builder`], the ports [`In`], [`Out`], [`EventOut`], [`Prop`],
-//! [`Context`], [`Answer`]; [`record!`](crate::record) for structs that travel through ports; [`Library`] to give types to
+//! [`Context`], [`OperationAnswer`]; [`record!`](crate::record) for structs that travel through ports; [`Library`] to give types to
 //! a program. For those who run them: the platform adapter `platform::embedded`.
 //!
 //! What is absent: a running component shares no lock with the configurator; a component knows no other component, no
@@ -32,10 +32,10 @@ mod words;
 pub use crate::model::ActivityStatus;
 pub use beat::{Notice, NoticeSink, Notices};
 pub use builder::Builder;
-pub use component::{Answer, Arguments, Component, Context, Failure, HookResult, Returned, Ticket};
-pub use library::{Kind, Libraries, Library};
+pub use component::{Arguments, Component, Context, Failure, HookResult, OperationAnswer, Returned, Ticket};
+pub use library::{ComponentFactory, Libraries, Library};
 pub use port::{EventIn, EventOut, In, Out, Sample};
-pub use probe::{Observed, Probes, Seen};
+pub use probe::{Observed, ProbeReading, Probes};
 pub use property::Prop;
 pub use sight::Sight;
 pub use value::{PortValue, record};

@@ -6,7 +6,7 @@
 
 use super::beat::Beat;
 use super::latest::{Reader, Writer, latest};
-use super::links::{Links, Sender, links};
+use super::links::{Links, LinksSender, links};
 use super::probe::{ProbeTap, Tapped};
 use super::value::PortValue;
 use crate::model::{EventName, Policy, Value};
@@ -327,7 +327,7 @@ pub trait InEnd: Send {
 }
 
 struct InPortEnd<T> {
-    sender: Sender<Source<T>>,
+    sender: LinksSender<Source<T>>,
     written: Option<Writer<Stamped<T>>>,
     beat: Arc<Beat>,
 }
@@ -390,7 +390,7 @@ pub(crate) trait OutEnd: Send {
     fn tap(&mut self, id: u64, wake: Option<Arc<Beat>>) -> Box<dyn ProbeTap>;
 }
 
-impl<T: PortValue> OutEnd for Sender<PortTarget<T>> {
+impl<T: PortValue> OutEnd for LinksSender<PortTarget<T>> {
     fn attach(&mut self, id: u64, feed: Box<dyn Feed>) {
         let target = if feed.as_any().is::<Inlet<T>>() {
             match feed.into_any().downcast::<Inlet<T>>() {

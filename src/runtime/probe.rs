@@ -3,14 +3,14 @@
 //! A probe of a port is one more link of it, with a cell of its own: whoever writes does not wait for it, and is not
 //! changed by it but for one more exchange a write. A probe comes and goes with what it looks at; what has none is absent.
 
-use super::activity::Activity;
+use super::activity::ActivityThread;
 use super::beat::Beat;
 use super::cell::Cell;
 use super::latest::Reader;
-use super::links::{Links, Sender, links};
+use super::links::{Links, LinksSender, links};
 use super::port::Stamped;
 use super::value::PortValue;
-use crate::model::monitor::{Counter, Part};
+use crate::model::monitor::{Counter, ValuePart};
 use crate::model::{ComponentName, Ident, MemberRef, RunState};
 use crate::time::Time;
 use std::sync::Arc;
@@ -32,7 +32,7 @@ pub(crate) trait ProbeTap: Send {
     fn fetch(&mut self) -> Option<(Time, u64)>;
 
     /// The number on this way into the value fetched last; none when there is none.
-    fn number(&self, path: &[Part]) -> Option<f64>;
+    fn number(&self, path: &[ValuePart]) -> Option<f64>;
 }
 
 /// The reading end of a probe.
@@ -47,7 +47,7 @@ impl<T: PortValue> ProbeTap for Tapped<T> {
         slot.value.is_some().then_some((slot.at, *writes))
     }
 
-    fn number(&self, path: &[Part]) -> Option<f64> {
+    fn number(&self, path: &[ValuePart]) -> Option<f64> {
         self.reader.value().0.value.as_ref().and_then(|value| value.number(path))
     }
 }
@@ -56,7 +56,7 @@ impl<T: PortValue> ProbeTap for Tapped<T> {
 pub(crate) enum Probe {
     Port(Box<dyn ProbeTap>),
     Component(Arc<Cell>),
-    Activity(Arc<Activity>),
+    Activity(Arc<ActivityThread>),
 }
 
 /// The probes a component has, by the place of what they look at in its list of [`Observed`].
@@ -67,13 +67,13 @@ pub struct Probes {
 /// The configurator's end of the probes of one component.
 pub(crate) struct ProbesEnd {
     pub(crate) wanted: Arc<[Observed]>,
-    pub(crate) sender: Sender<(usize, Probe)>,
+    pub(crate) sender: LinksSender<(usize, Probe)>,
     /// Of a component in an event-driven activity: a write to what it looks at wakes it.
     pub(crate) wake: Option<Arc<Beat>>,
 }
 
 /// What a probe shows.
-pub struct Seen<'a>(&'a mut Probe);
+pub struct ProbeReading<'a>(&'a mut Probe);
 
 impl Probes {
     pub(crate) fn new(wanted: Arc<[Observed]>, beat: &Arc<Beat>) -> (Self, ProbesEnd) {
@@ -89,13 +89,13 @@ impl Probes {
 
     /// All probes there are now, each with the place of what it looks at. Several may look at one place (an in-port that
     /// is being connected anew): the newest comes last.
-    pub fn each(&mut self) -> impl Iterator<Item = (usize, Seen<'_>)> {
+    pub fn each(&mut self) -> impl Iterator<Item = (usize, ProbeReading<'_>)> {
         self.links.refresh();
-        self.links.iter_mut().map(|(place, probe)| (*place, Seen(probe)))
+        self.links.iter_mut().map(|(place, probe)| (*place, ProbeReading(probe)))
     }
 }
 
-impl Seen<'_> {
+impl ProbeReading<'_> {
     /// Of a port: when it was written last and how often since the probe is there.
     pub fn written(&mut self) -> Option<(Time, u64)> {
         match self.0 {
@@ -105,7 +105,7 @@ impl Seen<'_> {
     }
 
     /// Of a port that was written: the number on this way into its value.
-    pub fn number(&self, path: &[Part]) -> Option<f64> {
+    pub fn number(&self, path: &[ValuePart]) -> Option<f64> {
         match &self.0 {
             Probe::Port(tap) => tap.number(path),
             _ => None,

@@ -2,8 +2,8 @@
 
 use super::probe::{Observed, Probes};
 use crate::model::RunState;
-use crate::model::monitor::{Counter, Part};
-use crate::monitor::{Input, Sample, state_value};
+use crate::model::monitor::{Counter, ValuePart};
+use crate::monitor::{InputSample, MonitorInput, state_value};
 use crate::time::Time;
 use std::sync::Arc;
 
@@ -17,7 +17,7 @@ pub struct Sight {
 
 /// What an input takes from its probe.
 enum SightOf {
-    Number(Vec<Part>),
+    Number(Vec<ValuePart>),
     State,
     Faulted,
     Counter(Counter),
@@ -25,15 +25,17 @@ enum SightOf {
 
 impl Sight {
     /// What serves these inputs.
-    pub fn of(inputs: &[Input]) -> Self {
+    pub fn of(inputs: &[MonitorInput]) -> Self {
         let mut wanted: Vec<Observed> = Vec::new();
         let mut served: Vec<Vec<(usize, SightOf)>> = Vec::new();
         for (i, input) in inputs.iter().enumerate() {
             let (of, what) = match input {
-                Input::Port(signal) => (Observed::Port(signal.member), SightOf::Number(signal.path.clone())),
-                Input::State(component) => (Observed::Component(*component), SightOf::State),
-                Input::Faulted(component) => (Observed::Component(*component), SightOf::Faulted),
-                Input::Activity { activity, counter } => (Observed::Activity(*activity), SightOf::Counter(*counter)),
+                MonitorInput::Port(signal) => (Observed::Port(signal.member), SightOf::Number(signal.path.clone())),
+                MonitorInput::State(component) => (Observed::Component(*component), SightOf::State),
+                MonitorInput::Faulted(component) => (Observed::Component(*component), SightOf::Faulted),
+                MonitorInput::Activity { activity, counter } => {
+                    (Observed::Activity(*activity), SightOf::Counter(*counter))
+                }
             };
             let place = wanted.iter().position(|w| *w == of).unwrap_or_else(|| {
                 wanted.push(of);
@@ -51,7 +53,7 @@ impl Sight {
     }
 
     /// Takes the newest samples: of each input that something serves now; the others are absent.
-    pub fn look(&self, probes: &mut Probes, now: Time, samples: &mut [Sample]) {
+    pub fn look(&self, probes: &mut Probes, now: Time, samples: &mut [InputSample]) {
         for sample in samples.iter_mut() {
             sample.present = false;
         }
@@ -69,7 +71,7 @@ impl Sight {
                     SightOf::Counter(counter) => seen.counter(*counter).map(|value| (value, now, 0)),
                 };
                 if let Some((value, at, writes)) = sample {
-                    samples[*input] = Sample { value, at, writes, present: true };
+                    samples[*input] = InputSample { value, at, writes, present: true };
                 }
             }
         }

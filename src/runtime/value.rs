@@ -1,6 +1,6 @@
 //! Rust types as values of the model: what travels through ports, is a property, an argument or a result.
 
-use crate::model::monitor::Part;
+use crate::model::monitor::ValuePart;
 use crate::model::{EventName, Ident, Value, ValueType};
 use std::sync::Arc;
 
@@ -23,7 +23,7 @@ pub trait PortValue: Clone + Send + 'static {
     ///
     /// Allocates nothing for the types named above; a type of your own that does not say otherwise goes through
     /// [`PortValue::to_value`].
-    fn number(&self, path: &[Part]) -> Option<f64> {
+    fn number(&self, path: &[ValuePart]) -> Option<f64> {
         self.to_value().number(path)
     }
 
@@ -46,7 +46,7 @@ impl PortValue for bool {
             _ => None,
         }
     }
-    fn number(&self, path: &[Part]) -> Option<f64> {
+    fn number(&self, path: &[ValuePart]) -> Option<f64> {
         path.is_empty().then(|| f64::from(u8::from(*self)))
     }
 }
@@ -68,7 +68,7 @@ macro_rules! integers {
                 }
             }
             #[allow(clippy::cast_precision_loss, clippy::cast_lossless)]
-            fn number(&self, path: &[Part]) -> Option<f64> {
+            fn number(&self, path: &[ValuePart]) -> Option<f64> {
                 path.is_empty().then_some(*self as f64)
             }
             #[allow(clippy::cast_precision_loss, clippy::cast_lossless)]
@@ -93,7 +93,7 @@ impl PortValue for f64 {
     fn from_value(value: &Value) -> Option<Self> {
         value.as_f64()
     }
-    fn number(&self, path: &[Part]) -> Option<f64> {
+    fn number(&self, path: &[ValuePart]) -> Option<f64> {
         path.is_empty().then_some(*self)
     }
 }
@@ -109,7 +109,7 @@ impl PortValue for f32 {
     fn from_value(value: &Value) -> Option<Self> {
         value.as_f64().map(|v| v as Self)
     }
-    fn number(&self, path: &[Part]) -> Option<f64> {
+    fn number(&self, path: &[ValuePart]) -> Option<f64> {
         path.is_empty().then(|| f64::from(*self))
     }
 }
@@ -127,7 +127,7 @@ impl PortValue for String {
             _ => None,
         }
     }
-    fn number(&self, _: &[Part]) -> Option<f64> {
+    fn number(&self, _: &[ValuePart]) -> Option<f64> {
         None
     }
 }
@@ -145,7 +145,7 @@ impl PortValue for Arc<str> {
             _ => None,
         }
     }
-    fn number(&self, _: &[Part]) -> Option<f64> {
+    fn number(&self, _: &[ValuePart]) -> Option<f64> {
         None
     }
 }
@@ -163,7 +163,7 @@ impl PortValue for EventName {
             _ => None,
         }
     }
-    fn number(&self, _: &[Part]) -> Option<f64> {
+    fn number(&self, _: &[ValuePart]) -> Option<f64> {
         None
     }
 }
@@ -188,7 +188,7 @@ impl<T: PortValue, const N: usize> PortValue for [T; N] {
         });
         fits.then(|| converted.map(|element| element.expect("all elements fit")))
     }
-    fn number(&self, path: &[Part]) -> Option<f64> {
+    fn number(&self, path: &[ValuePart]) -> Option<f64> {
         element(self, path)
     }
     fn limits() -> Option<(f64, f64)> {
@@ -209,7 +209,7 @@ impl<T: PortValue> PortValue for Vec<T> {
             _ => None,
         }
     }
-    fn number(&self, path: &[Part]) -> Option<f64> {
+    fn number(&self, path: &[ValuePart]) -> Option<f64> {
         element(self, path)
     }
     fn limits() -> Option<(f64, f64)> {
@@ -227,15 +227,15 @@ impl<const N: usize> PortValue for nalgebra::SVector<f64, N> {
     fn from_value(value: &Value) -> Option<Self> {
         <[f64; N]>::from_value(value).map(Self::from)
     }
-    fn number(&self, path: &[Part]) -> Option<f64> {
+    fn number(&self, path: &[ValuePart]) -> Option<f64> {
         element(self.as_slice(), path)
     }
 }
 
-fn element<T: PortValue>(values: &[T], path: &[Part]) -> Option<f64> {
+fn element<T: PortValue>(values: &[T], path: &[ValuePart]) -> Option<f64> {
     match path.split_first()? {
-        (Part::Index(index), rest) => values.get(*index)?.number(rest),
-        (Part::Field(_), _) => None,
+        (ValuePart::Index(index), rest) => values.get(*index)?.number(rest),
+        (ValuePart::Field(_), _) => None,
     }
 }
 

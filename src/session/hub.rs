@@ -5,10 +5,10 @@
 
 use super::halt::StoppingState;
 use super::lanes::Lanes;
-use super::log::{Answered, Fault, Happening, Log, LogEntry, Phase};
+use super::log::{ComponentFault, Happening, Log, LogEntry, LoggedAnswer, Phase};
 use super::names::Unlisted;
-use super::tap::Hears;
-use crate::coordinator::{Put, Refused};
+use super::tap::LogSink;
+use crate::coordinator::{NotAccepted, Put};
 use crate::limits;
 use crate::model::{Ask, ConfigId, EventName, Raise, RequestId};
 use crate::time::{Clock, Signal, Time};
@@ -45,10 +45,10 @@ struct HubState {
     phase: Phase,
     next: u64,
     outstanding: FxHashMap<RequestId, Outstanding>,
-    faults: Vec<Fault>,
+    faults: Vec<ComponentFault>,
     log: Log,
     observers: Vec<Observer>,
-    taps: Vec<Arc<dyn Hears>>,
+    taps: Vec<Arc<dyn LogSink>>,
     /// The newest answers and events, for those who wait for one.
     heard: Lanes<String>,
     /// Events that found an inbox full since that was last told, and when it was.
@@ -58,7 +58,7 @@ struct HubState {
     /// taken up, and whether one heard it.
     tickets: FxHashMap<u64, (usize, bool)>,
     /// The newest answers.
-    answers: VecDeque<Answered>,
+    answers: VecDeque<LoggedAnswer>,
     /// By coordinator: what its states are written with (`arm:`, or nothing), and its active ones.
     active: BTreeMap<String, Vec<String>>,
     epoch: u64,
@@ -165,8 +165,8 @@ impl Hub {
 
     /// Counts an event that was lost since its coordinator's inbox is full. That is told at once, and what comes after it at
     /// most once in [`limits::DROPS_TOLD`], with the next event that comes then.
-    pub fn taken(&self, taken: Result<Put, Refused>) {
-        let full = matches!(taken, Err(Refused::Full) | Ok(Put::Displaced));
+    pub fn taken(&self, taken: Result<Put, NotAccepted>) {
+        let full = matches!(taken, Err(NotAccepted::Full) | Ok(Put::Displaced));
         if !full && !self.untold.load(Ordering::Relaxed) {
             return;
         }
@@ -255,7 +255,7 @@ impl Hub {
     }
 
     /// From now on everything that happens is handed to `tap`.
-    pub fn attach(&self, tap: Arc<dyn Hears>) {
+    pub fn attach(&self, tap: Arc<dyn LogSink>) {
         self.lock().taps.push(tap);
     }
 
@@ -281,7 +281,7 @@ impl Hub {
     }
 
     /// A request was answered. It stays outstanding until it is [settled](Self::settled), when whoever asked has been told.
-    pub fn answered(&self, answered: Answered) {
+    pub fn answered(&self, answered: LoggedAnswer) {
         {
             let mut state = self.lock();
             if state.answers.len() == limits::HEARD {
@@ -314,7 +314,7 @@ impl Hub {
         {
             let mut state = self.lock();
             state.faults.retain(|f| f.component != component);
-            state.faults.push(Fault { component: component.to_owned(), reason: reason.to_owned(), at });
+            state.faults.push(ComponentFault { component: component.to_owned(), reason: reason.to_owned(), at });
         }
         self.note(Happening::Fault { component: component.to_owned(), reason: reason.to_owned() });
     }
@@ -377,7 +377,7 @@ impl Hub {
     }
 
     /// What is wrong.
-    pub fn faults(&self) -> Vec<Fault> {
+    pub fn faults(&self) -> Vec<ComponentFault> {
         self.lock().faults.clone()
     }
 
@@ -424,7 +424,7 @@ impl Hub {
     }
 
     /// The answer to a request, if it has come (and is not long ago).
-    pub fn answer(&self, request: RequestId) -> Option<Answered> {
+    pub fn answer(&self, request: RequestId) -> Option<LoggedAnswer> {
         self.lock().answers.iter().rev().find(|a| a.request == request.0).cloned()
     }
 

@@ -61,7 +61,7 @@ pub enum Happening {
         by: String,
     },
     /// A request was answered.
-    Answered(Answered),
+    Answered(LoggedAnswer),
     /// An answer came after the state that asked had been left; the coordinator did not hear it.
     Stale {
         /// The answer.
@@ -132,7 +132,7 @@ pub enum Happening {
 
 /// An answer with what led to it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Answered {
+pub struct LoggedAnswer {
     /// The request's number.
     pub request: u64,
     /// What was asked.
@@ -238,7 +238,7 @@ impl Log {
 
 /// A component that failed, or whose call has not returned.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Fault {
+pub struct ComponentFault {
     /// The component.
     pub component: String,
     /// What is wrong with it.
@@ -249,7 +249,7 @@ pub struct Fault {
 
 /// A frame of the stack.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct FrameView {
+pub struct FrameStatus {
     /// The configuration it was made by.
     pub configuration: String,
     /// Who asked.
@@ -282,11 +282,11 @@ pub struct StatusView {
     /// The system as the configurator knows it; none, as of the next two: it has not answered, and nobody knows.
     pub system: Option<Snapshot>,
     /// Frames in force, newest last.
-    pub stack: Option<Vec<FrameView>>,
+    pub stack: Option<Vec<FrameStatus>>,
     /// What is left of an application that is neither done nor undone; empty unless it is broken.
     pub residual: Option<Vec<Difference>>,
     /// What is wrong.
-    pub faults: Vec<Fault>,
+    pub faults: Vec<ComponentFault>,
     /// Requests that are not answered yet.
     pub outstanding: Vec<String>,
     /// What stopping is at, once it has begun.

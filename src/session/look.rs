@@ -4,7 +4,7 @@ use super::Session;
 use super::log::StatusView;
 use crate::model::monitor::MONITORS_TYPE;
 use crate::model::{ActivityStatus, ComponentName, Ident, MemberRef, RunState, Value};
-use crate::monitor::{Input, Sample};
+use crate::monitor::{InputSample, MonitorInput};
 use serde::Serialize;
 use std::cell::RefCell;
 use std::time::Duration;
@@ -42,7 +42,7 @@ impl Session {
         let components = status.system.iter().flat_map(|system| &system.components);
         let evaluating = components.filter(|(_, it)| it.ty.as_str() == MONITORS_TYPE);
         let mut monitors: Vec<Monitored> = Vec::new();
-        let mut inputs: Vec<Input> = Vec::new();
+        let mut inputs: Vec<MonitorInput> = Vec::new();
         // Of which monitor, and whether it says how far it is.
         let mut of: Vec<(usize, bool)> = Vec::new();
         for (component, it) in evaluating {
@@ -52,7 +52,7 @@ impl Session {
                 if enabled && it.state == RunState::Running {
                     for (port, distance) in [(format!("is_{name}"), false), (format!("robustness_of_{name}"), true)] {
                         let Ok(port) = Ident::new(&port) else { continue };
-                        inputs.push(Input::whole(MemberRef { component: *component, member: port }));
+                        inputs.push(MonitorInput::whole(MemberRef { component: *component, member: port }));
                         of.push((monitors.len(), distance));
                     }
                 }
@@ -72,10 +72,10 @@ impl Session {
     }
 
     /// The next samples of all of these, as far as they come within that time. None: this platform does not show them.
-    pub(super) fn samples(&self, inputs: &[Input], within: Duration) -> Option<Vec<Sample>> {
+    pub(super) fn samples(&self, inputs: &[MonitorInput], within: Duration) -> Option<Vec<InputSample>> {
         let watch = self.platform().watch(inputs, &self.clock().signal());
         let watch = RefCell::new(watch.filter(|watch| (0..inputs.len()).all(|input| watch.shows(input)))?);
-        let samples = RefCell::new(vec![Sample::default(); inputs.len()]);
+        let samples = RefCell::new(vec![InputSample::default(); inputs.len()]);
         // What has come when time is up counts as well.
         let _ = self.hub().wait_outside(within, |hub| {
             let mut samples = samples.borrow_mut();

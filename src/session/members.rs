@@ -3,12 +3,12 @@
 use super::{Session, Unanswered};
 use crate::limits;
 use crate::model::finding::did_you_mean;
-use crate::model::monitor::{Part, PortSignal};
+use crate::model::monitor::{PortSignal, ValuePart};
 use crate::model::{
     Ask, ChangeKind, ComponentName, ComponentType, ConfigId, Configuration, Direction, Ident, MemberRef, OperatorMay,
     RequestId, Value, ValueType,
 };
-use crate::monitor::{Input, Sample};
+use crate::monitor::{InputSample, MonitorInput};
 use crate::time::lock;
 use serde::Serialize;
 use serde_json::Value as Json;
@@ -175,7 +175,8 @@ impl Session {
     fn sample(&self, member: MemberRef, ty: &ValueType, within: Duration) -> Result<(Json, f64), String> {
         let unseen = || format!("what goes through a port of the type {ty} is not shown");
         let parts = parts(ty).filter(|parts| parts.len() <= limits::GET_PARTS).ok_or_else(unseen)?;
-        let inputs: Vec<Input> = parts.into_iter().map(|path| Input::Port(PortSignal { member, path })).collect();
+        let inputs: Vec<MonitorInput> =
+            parts.into_iter().map(|path| MonitorInput::Port(PortSignal { member, path })).collect();
         let samples = self.samples(&inputs, within).ok_or("this platform does not show what goes through ports")?;
         if !samples.iter().all(|sample| sample.present) {
             return Err(format!("nothing went through it in {} s", within.as_secs_f64()));
@@ -191,19 +192,20 @@ fn unknown(component: ComponentName, member: &str, ty: &ComponentType) -> NoMemb
 }
 
 /// The ways to all numbers in a value of a type; none: there may be anything in it.
-fn parts(ty: &ValueType) -> Option<Vec<Vec<Part>>> {
-    let below = |step: Part, ty: &ValueType| -> Option<Vec<Vec<Part>>> {
-        let under = |path: Vec<Part>| std::iter::once(step).chain(path).collect();
+fn parts(ty: &ValueType) -> Option<Vec<Vec<ValuePart>>> {
+    let below = |step: ValuePart, ty: &ValueType| -> Option<Vec<Vec<ValuePart>>> {
+        let under = |path: Vec<ValuePart>| std::iter::once(step).chain(path).collect();
         Some(parts(ty)?.into_iter().map(under).collect())
     };
     match ty {
         ValueType::Bool | ValueType::Int | ValueType::Float => Some(vec![Vec::new()]),
         ValueType::Array(element, Some(length)) if *length <= limits::GET_PARTS => {
-            let each = (0..*length).map(|at| below(Part::Index(at), element)).collect::<Option<Vec<_>>>()?;
+            let each = (0..*length).map(|at| below(ValuePart::Index(at), element)).collect::<Option<Vec<_>>>()?;
             Some(each.concat())
         }
         ValueType::Record(fields) => {
-            let each = fields.iter().map(|(name, ty)| below(Part::Field(*name), ty)).collect::<Option<Vec<_>>>()?;
+            let each =
+                fields.iter().map(|(name, ty)| below(ValuePart::Field(*name), ty)).collect::<Option<Vec<_>>>()?;
             Some(each.concat())
         }
         _ => None,
@@ -211,7 +213,7 @@ fn parts(ty: &ValueType) -> Option<Vec<Vec<Part>>> {
 }
 
 /// The value of that type whose numbers these are.
-fn assembled<'a>(ty: &ValueType, numbers: &mut impl Iterator<Item = &'a Sample>) -> Json {
+fn assembled<'a>(ty: &ValueType, numbers: &mut impl Iterator<Item = &'a InputSample>) -> Json {
     match ty {
         ValueType::Array(element, length) => {
             (0..length.unwrap_or_default()).map(|_| assembled(element, numbers)).collect()
@@ -260,7 +262,7 @@ mod tests {
 
     #[test]
     fn what_is_not_finite_is_told_as_text() {
-        let sample = |value| Sample { value, at: Time(0), writes: 1, present: true };
+        let sample = |value| InputSample { value, at: Time(0), writes: 1, present: true };
         let samples = [1.5, f64::INFINITY, f64::NEG_INFINITY, f64::NAN].map(sample);
         let ty = ValueType::Array(Box::new(ValueType::Float), Some(4));
         let seen = assembled(&ty, &mut samples.iter());

@@ -6,7 +6,7 @@
 use super::hub::Hub;
 use super::routes::{Junction, ToConfigurator};
 use crate::configurator::Requester;
-use crate::coordinator::Coordinator;
+use crate::coordinator::CoordinatorHandle;
 use crate::functions::Opener;
 use crate::model::{Deployment, EventName, Ident};
 use crate::statechart::{Chart, EventId, NodeId};
@@ -18,7 +18,7 @@ use std::sync::atomic::AtomicU64;
 pub(super) struct CoordinatorPart {
     pub name: Ident,
     pub chart: Arc<Chart>,
-    pub coordinator: Coordinator,
+    pub coordinator: CoordinatorHandle,
     pub up: Option<NodeId>,
     pub down: Option<NodeId>,
     /// It has functions: they see every event, also one that no transition lists.
@@ -57,11 +57,11 @@ impl CoordinatorPart {
             let thread = if several { format!("coordinator {name}") } else { "coordinator".to_owned() };
             let sees_all = functions.is_some();
             let coordinator = match functions {
-                None => Coordinator::start(&thread, chart.clone(), clock, listener),
+                None => CoordinatorHandle::start(&thread, chart.clone(), clock, listener),
                 Some(opener) => {
                     let time = clock.clone();
                     let open = move || opener.open(Some(time)).map_err(|failure| failure.to_string());
-                    Coordinator::start_with(&thread, chart.clone(), clock, listener, open)
+                    CoordinatorHandle::start_with(&thread, chart.clone(), clock, listener, open)
                 }
             };
             known.push((requester, coordinator.clone()));

@@ -5,7 +5,7 @@ use super::log::Happening;
 use super::names::NotFromOutside;
 use super::parts::CoordinatorPart;
 use super::routes::{Acted, NO_MORE, make_safe};
-use crate::coordinator::{Class, Refused};
+use crate::coordinator::{Class, NotAccepted};
 use crate::model::{EventName, Ident};
 
 /// An event that was given to all coordinators.
@@ -28,7 +28,7 @@ pub enum NotRaised {
     Stopping,
     /// A coordinator that may hear it does not keep up.
     #[error(transparent)]
-    Refused(#[from] Refused),
+    Refused(#[from] NotAccepted),
 }
 
 impl Session {
@@ -109,12 +109,12 @@ impl Session {
         for part in self.parts().iter().filter(|part| to(part.name)) {
             match part.coordinator.hold(incoming.class) {
                 Ok(()) => held.push(part),
-                Err(Refused::Full) if part.may_hear(event) => {
+                Err(NotAccepted::Full) if part.may_hear(event) => {
                     held.iter().for_each(|part| part.coordinator.release(incoming.class));
-                    return Err(Refused::Full.into());
+                    return Err(NotAccepted::Full.into());
                 }
-                Err(Refused::Full) => {}
-                Err(Refused::Detached) => gone = true,
+                Err(NotAccepted::Full) => {}
+                Err(NotAccepted::Detached) => gone = true,
             }
         }
         self.hub().note(Happening::Event { event: event.to_string(), from: from.to_owned() });
@@ -129,8 +129,8 @@ impl Session {
                 match part.coordinator.deliver(incoming) {
                     Ok(_) => continue,
                     // It waits already, and too many want to know what becomes of it.
-                    Err(Refused::Full) => unwatched = true,
-                    Err(Refused::Detached) => gone = true,
+                    Err(NotAccepted::Full) => unwatched = true,
+                    Err(NotAccepted::Detached) => gone = true,
                 }
                 missed += 1;
             }
@@ -140,6 +140,6 @@ impl Session {
             self.hub()
                 .note(Happening::Forced { note: format!("`{event}` was not delivered: the coordinator is gone") });
         }
-        if unwatched { Err(Refused::Full.into()) } else { Ok(acted) }
+        if unwatched { Err(NotAccepted::Full.into()) } else { Ok(acted) }
     }
 }

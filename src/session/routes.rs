@@ -3,13 +3,13 @@
 
 use super::halt::Heeded;
 use super::hub::{Hub, Meaning};
-use super::log::{Answered, Happening, StepTime};
+use super::log::{Happening, LoggedAnswer, StepTime};
 use super::steps::Steps;
 use crate::configurator::{Answer, Batch, ConfiguratorHandle, Progress, Reason, Request, Requester, Scope};
-use crate::coordinator::{ChartTrouble, Class, Coordinator, Delivered, Incoming, Listener, Refused, Tag};
+use crate::coordinator::{ChartTrouble, Class, CoordinatorHandle, Delivered, Incoming, Listener, NotAccepted, Tag};
 use crate::model::{Ask, Deployment, EventName, FAULTED, Precedence, RequestId, Verdict};
 use crate::platform::PlatformEvent;
-use crate::statechart::{Chart, EventId, NodeId, Printer, Raised, Said};
+use crate::statechart::{Chart, EventId, FunctionOutput, NodeId, Printer, Raised};
 use crate::time::lock;
 use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
@@ -24,7 +24,7 @@ pub(super) const NO_MORE: &str = "the deployment is being stopped, and does not 
 #[derive(Default)]
 pub(super) struct Junction {
     /// With the names under which they ask.
-    pub coordinators: Mutex<Vec<(Requester, Coordinator)>>,
+    pub coordinators: Mutex<Vec<(Requester, CoordinatorHandle)>>,
     pub configurator: Mutex<Option<ConfiguratorHandle>>,
     /// Events that go before all others, whoever raises them.
     urgent: FxHashMap<EventName, Precedence>,
@@ -66,7 +66,7 @@ impl Junction {
     }
 
     /// Gives an event to these. What becomes of it is told when all of them have it: whoever hears that may raise another one.
-    fn give(&self, hub: &Hub, to: Vec<Coordinator>, incoming: Incoming) {
+    fn give(&self, hub: &Hub, to: Vec<CoordinatorHandle>, incoming: Incoming) {
         let delivered: SmallVec<[_; 4]> = {
             let _giving = self.giving();
             to.iter().map(|coordinator| coordinator.deliver(incoming)).collect()
@@ -75,12 +75,12 @@ impl Junction {
     }
 
     /// The coordinator that asks under that name.
-    pub fn coordinator(&self, name: Requester) -> Option<Coordinator> {
+    pub fn coordinator(&self, name: Requester) -> Option<CoordinatorHandle> {
         lock(&self.coordinators).iter().find(|(own, _)| *own == name).map(|(_, coordinator)| coordinator.clone())
     }
 
     /// All of them.
-    pub fn all(&self) -> Vec<Coordinator> {
+    pub fn all(&self) -> Vec<CoordinatorHandle> {
         lock(&self.coordinators).iter().map(|(_, coordinator)| coordinator.clone()).collect()
     }
 }
@@ -113,7 +113,7 @@ impl Listener for ToConfigurator {
                     let scope = raised.scope.and_then(|state| u32::try_from(state.index()).ok()).map(Scope);
                     let request = Request { scope, tag, ..Request::new(id, ask, self.name) };
                     match self.hold() {
-                        Err(Refused::Full) => self.refuse(request),
+                        Err(NotAccepted::Full) => self.refuse(request),
                         _ => requests.requests.push(request),
                     }
                 }
@@ -189,7 +189,7 @@ impl Listener for ToConfigurator {
         self.hub.wake();
     }
 
-    fn said(&mut self, said: &Said) {
+    fn said(&mut self, said: &FunctionOutput) {
         let by = match said.by {
             Printer::Err => "err",
             Printer::Warn => "warn",
@@ -223,13 +223,13 @@ impl ToConfigurator {
         }
     }
 
-    fn own(&self) -> Option<Coordinator> {
+    fn own(&self) -> Option<CoordinatorHandle> {
         self.junction.upgrade().and_then(|junction| junction.coordinator(self.name))
     }
 
     /// Takes room for an answer.
-    fn hold(&self) -> Result<(), Refused> {
-        self.own().map_or(Err(Refused::Detached), |own| own.hold(Class::Answer))
+    fn hold(&self) -> Result<(), NotAccepted> {
+        self.own().map_or(Err(NotAccepted::Detached), |own| own.hold(Class::Answer))
     }
 
     /// Answers a request at once: there is no room for a later answer.
@@ -248,7 +248,7 @@ impl ToConfigurator {
         if self.hub.is_stopping() && junction.begins(event) {
             return;
         }
-        let others: Vec<Coordinator> = lock(&junction.coordinators)
+        let others: Vec<CoordinatorHandle> = lock(&junction.coordinators)
             .iter()
             .filter(|(name, other)| *name != self.name && other.chart().event(event) != EventId::OTHER)
             .map(|(_, other)| other.clone())
@@ -299,7 +299,7 @@ pub(super) fn on_answer(hub: &Hub, junction: &Junction, steps: &Steps, answer: &
 fn give(hub: &Hub, junction: &Junction, answer: &Answer, steps: Vec<StepTime>, class: Class) {
     let event = answer.event();
     let reasons: Vec<String> = answer.findings().iter().map(|finding| finding.message.clone()).collect();
-    hub.answered(Answered {
+    hub.answered(LoggedAnswer {
         request: answer.request.id.0,
         ask: answer.request.ask.to_string(),
         answer: event.to_string(),

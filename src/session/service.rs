@@ -1,7 +1,7 @@
 //! The methods of the control socket (`docs/control-socket.md`).
 
 use super::hub::Hub;
-use super::log::Answered;
+use super::log::LoggedAnswer;
 use super::members::NoMember;
 use super::names::instead;
 use super::raising::Offered;
@@ -263,7 +263,7 @@ fn event(session: &Session, params: &Json, gone: ServiceGone<'_>) -> Result<Json
             session.hub().forget(ticket);
             let all = |hub: &Hub| requests.iter().map(|request| hub.answer(*request)).collect::<Option<Vec<_>>>();
             let late = || format!("what `{name}` does by itself was not over in time");
-            let answers: Vec<Answered> = wait(session, within, gone, late, all)?;
+            let answers: Vec<LoggedAnswer> = wait(session, within, gone, late, all)?;
             answer["taken"] = json!(true);
             if before {
                 answer["before"] = json!(true);
@@ -359,6 +359,6 @@ fn answer_to(
         return Ok(json!({ "request": request }));
     }
     let late = || format!("`{what}` was not answered in time");
-    let answer: Answered = wait(session, within, gone, late, |hub| hub.answer(request))?;
+    let answer: LoggedAnswer = wait(session, within, gone, late, |hub| hub.answer(request))?;
     Ok(view(&answer))
 }

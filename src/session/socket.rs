@@ -9,7 +9,7 @@ use super::owner::Owner;
 use super::place::{self, KnownName};
 use super::serving::{ServedCalls, ServingShared};
 use super::subscribers::{Subscribers, ToSubscribers};
-use super::tap::Hears;
+use super::tap::LogSink;
 use crate::limits;
 use crate::time::{Clock, lock};
 use std::fs;
@@ -125,7 +125,7 @@ impl ControlSocket {
     ///
     /// # Errors
     /// When the operating system has no thread left.
-    pub fn observer(&self, clock: &Clock) -> io::Result<Arc<dyn Hears>> {
+    pub fn observer(&self, clock: &Clock) -> io::Result<Arc<dyn LogSink>> {
         let observer = self.shared.subscribers.observer(clock)?;
         *lock(&self.observer) = Some(observer.clone());
         Ok(Arc::new(observer))

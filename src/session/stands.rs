@@ -9,7 +9,7 @@ use crate::configurator::{Conditions, Truth};
 use crate::limits;
 use crate::model::monitor::Condition;
 use crate::model::{Catalogue, ComponentName, ComponentType, Deployment};
-use crate::monitor::{Bank, Input, Sample};
+use crate::monitor::{Bank, InputSample, MonitorInput};
 use crate::platform::{Platform, Watch};
 use crate::time::{Clock, Signal, Time, lock};
 use std::collections::BTreeMap;
@@ -35,7 +35,7 @@ struct UnderWatch {
     bank: Bank,
     watch: Option<Box<dyn Watch>>,
     /// Of the bank's inputs, then whether each component is faulted.
-    samples: Vec<Sample>,
+    samples: Vec<InputSample>,
     /// How many of them are the bank's, and which of these are ports.
     own: usize,
     ports: Vec<usize>,
@@ -59,12 +59,12 @@ impl UnderWatch {
         condition.for_each_component(&mut |name, _| components.push(name));
         components.sort_unstable();
         components.dedup();
-        inputs.extend(components.into_iter().map(Input::Faulted));
-        let ports = (0..own).filter(|i| matches!(inputs[*i], Input::Port(_))).collect();
-        let counts = inputs.iter().any(|input| matches!(input, Input::Activity { .. }));
+        inputs.extend(components.into_iter().map(MonitorInput::Faulted));
+        let ports = (0..own).filter(|i| matches!(inputs[*i], MonitorInput::Port(_))).collect();
+        let counts = inputs.iter().any(|input| matches!(input, MonitorInput::Activity { .. }));
         let watch = platform.watch(&inputs, wake);
         let unseen = watch.as_ref().is_none_or(|watch| !(0..own).all(|input| watch.shows(input)));
-        let samples = vec![Sample::default(); inputs.len()];
+        let samples = vec![InputSample::default(); inputs.len()];
         Self { bank, watch, samples, own, ports, counts, truth: Truth { unseen, ..Truth::default() } }
     }
 

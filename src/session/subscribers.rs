@@ -4,7 +4,7 @@
 use super::connection::SocketConnection;
 use super::log::LogEntry;
 use super::rpc;
-use super::tap::{Full, Hears, News, Tap};
+use super::tap::{Full, LogSink, News, Tap};
 use crate::limits;
 use crate::time::{Clock, lock};
 use serde_json::json;
@@ -127,7 +127,7 @@ impl ToSubscribers {
     }
 }
 
-impl Hears for ToSubscribers {
+impl LogSink for ToSubscribers {
     fn hear(&self, entry: &Arc<LogEntry>) {
         // Nobody listens: no thread is woken.
         if self.subscribers.count.load(Ordering::Acquire) > 0 {

@@ -17,7 +17,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 /// Something that hears all that happens. Never waits, but where it is asked to keep pace.
-pub trait Hears: Send + Sync {
+pub trait LogSink: Send + Sync {
     /// Called in the thread that acts, in the order in which things happen.
     fn hear(&self, entry: &Arc<LogEntry>);
 
@@ -194,7 +194,7 @@ impl<T> Tap<T> {
     }
 }
 
-impl<T: From<Arc<LogEntry>> + Send> Hears for Tap<T> {
+impl<T: From<Arc<LogEntry>> + Send> LogSink for Tap<T> {
     fn hear(&self, entry: &Arc<LogEntry>) {
         self.put(T::from(entry.clone()));
     }

@@ -4,7 +4,7 @@ use super::Command;
 use super::halt::StoppingView;
 use super::hub::Hub;
 use super::life::{Ended, UNSEEN, leftovers};
-use super::log::{FrameView, Happening, Phase, StatusView};
+use super::log::{FrameStatus, Happening, Phase, StatusView};
 use super::parts::{CoordinatorPart, between};
 use super::recovery::Difference;
 use super::routes::{Junction, on_answer, on_platform, on_progress};
@@ -318,7 +318,7 @@ impl Session {
             coordinator: self.parts[0].coordinator.active(),
             coordinators: self.active(),
             system: view.map(|view| view.and_then(|view| view.system.as_deref().cloned()).unwrap_or_default()),
-            stack: frames.map(|frames| frames.iter().map(FrameView::of).collect()),
+            stack: frames.map(|frames| frames.iter().map(FrameStatus::of).collect()),
             residual: view.map(|view| view.map_or_else(Vec::new, Difference::of_view)),
             faults: self.hub.faults(),
             outstanding: self.hub.outstanding(),
@@ -459,7 +459,7 @@ impl Drop for Session {
     }
 }
 
-impl FrameView {
+impl FrameStatus {
     fn of(frame: &crate::configurator::FrameView) -> Self {
         Self {
             configuration: frame.configuration.to_string(),

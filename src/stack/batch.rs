@@ -11,7 +11,7 @@ use super::{FrameId, Reason, Request, Requester, Residual, Why, World, claims, m
 
 use crate::model::{Ask, ComponentName, ConfigId, Configuration, Finding, OnFailure, Step, Verdict, codes};
 use crate::plan::replace::neighbours;
-use crate::plan::{Context, PlannedStep, Refusal};
+use crate::plan::{PlanContext, PlannedStep, Refusal};
 use crate::system::Overlay;
 use crate::time::Time;
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -26,7 +26,7 @@ pub struct Rules<'a> {
     /// What an operator may apply without force, beside what is safe: the deployment's `operator:`.
     pub operator: &'a FxHashSet<ConfigId>,
     /// What plans are made with.
-    pub context: &'a Context,
+    pub context: &'a PlanContext,
     /// When.
     pub at: Time,
     /// Frames that others under way pop or hand over to, and those that wait for their confirmation.
@@ -79,7 +79,7 @@ pub struct Group {
 }
 
 /// What one request comes to.
-enum Resolved<'a> {
+enum ResolvedRequest<'a> {
     Op(Op<'a>),
     Tell(Option<Verdict>, Option<Reason>),
     Commit,
@@ -94,7 +94,7 @@ pub fn take_up(world: &World, requests: &[Request], rules: &Rules<'_>) -> Group 
     let context = if world.broken.is_empty() && world.quarantined.is_empty() {
         rules.context
     } else {
-        avoiding = Context { avoid: world.avoided(), ..rules.context.clone() };
+        avoiding = PlanContext { avoid: world.avoided(), ..rules.context.clone() };
         &avoiding
     };
     let mut refused: SmallVec<[Told; 2]> = SmallVec::new();
@@ -107,10 +107,10 @@ pub fn take_up(world: &World, requests: &[Request], rules: &Rules<'_>) -> Group 
                 continue;
             }
             match resolve(world, &work, request, rules, repairs.is_some()) {
-                Resolved::Tell(verdict, reason) => group.told.push(Told { place, verdict, reason }),
-                Resolved::Commit => group.commits = true,
-                Resolved::Down => group.down = true,
-                Resolved::Op(op) => {
+                ResolvedRequest::Tell(verdict, reason) => group.told.push(Told { place, verdict, reason }),
+                ResolvedRequest::Commit => group.commits = true,
+                ResolvedRequest::Down => group.down = true,
+                ResolvedRequest::Op(op) => {
                     let visit = request.ask.is_undo() && request.scope.is_some();
                     let visit = if let (true, Op::Undo(frame)) = (visit, &op) { Some(*frame) } else { None };
                     if let (Some(at), Op::Undo(frame)) = (repairs, &op)
@@ -158,7 +158,7 @@ fn add(
     work: &mut Work<'_, '_, '_>,
     request: &Request,
     op: &Op<'_>,
-    (rules, context): (&Rules<'_>, &Context),
+    (rules, context): (&Rules<'_>, &PlanContext),
     repaired: bool,
 ) -> Result<(), Refusal> {
     match op {
@@ -227,8 +227,8 @@ fn own(request: &Request) -> Option<Requester> {
     if request.force { None } else { Some(request.requester) }
 }
 
-fn tell<'a>(verdict: Verdict, reason: Reason) -> Resolved<'a> {
-    Resolved::Tell(Some(verdict), Some(reason))
+fn tell<'a>(verdict: Verdict, reason: Reason) -> ResolvedRequest<'a> {
+    ResolvedRequest::Tell(Some(verdict), Some(reason))
 }
 
 fn resolve<'a>(
@@ -237,10 +237,10 @@ fn resolve<'a>(
     request: &Request,
     rules: &Rules<'a>,
     repaired: bool,
-) -> Resolved<'a> {
+) -> ResolvedRequest<'a> {
     let failed = request.ask.failed();
     if request.why == Why::Down {
-        return Resolved::Down;
+        return ResolvedRequest::Down;
     }
     let still_broken = |components: &mut dyn Iterator<Item = ComponentName>| {
         world.broken_at(components).map(|broken| Reason::StillBroken(broken.residual.clone()))
@@ -258,7 +258,7 @@ fn resolve<'a>(
                 return tell(failed, reason);
             }
             let Request { requester, scope, .. } = *request;
-            Resolved::Op(Op::Push { configuration, requester, at: rules.at, scope })
+            ResolvedRequest::Op(Op::Push { configuration, requester, at: rules.at, scope })
         }
         Ask::UndoOf(id) => {
             if !rules.configurations.contains_key(&id) {
@@ -267,7 +267,7 @@ fn resolve<'a>(
             let found = match (request.why, request.scope) {
                 (Why::Unconfirmed(frame), _) => match work.frames.iter().find(|f| f.id == frame) {
                     Some(frame) => Some(frame),
-                    None => return Resolved::Tell(None, None),
+                    None => return ResolvedRequest::Tell(None, None),
                 },
                 // Leaving a state undoes the frame of that visit and no other; that of a later one, which has gone before
                 // since it is safe, stands above.
@@ -290,7 +290,7 @@ fn resolve<'a>(
                     {
                         return tell(failed, reason);
                     }
-                    Resolved::Op(Op::Undo(frame.id))
+                    ResolvedRequest::Op(Op::Undo(frame.id))
                 }
                 None if request.scope.is_none() && world.stack.is_buried(id, own(request)) => tell(
                     failed,
@@ -308,13 +308,13 @@ fn resolve<'a>(
                 {
                     tell(failed, Reason::NeedsForce(id))
                 }
-                None => Resolved::Tell(Some(Verdict::Undone), None),
+                None => ResolvedRequest::Tell(Some(Verdict::Undone), None),
             }
         }
         Ask::Undo => match work.frames.iter().rev().find(|frame| frame.requester == request.requester) {
             Some(frame) => match still_broken(&mut share::components(&frame.footprint).into_iter()) {
                 Some(reason) if !frame.safe => tell(failed, reason),
-                _ => Resolved::Op(Op::Undo(frame.id)),
+                _ => ResolvedRequest::Op(Op::Undo(frame.id)),
             },
             None => tell(failed, Reason::NothingToUndo),
         },
@@ -326,7 +326,7 @@ fn resolve<'a>(
                 None | Some([]) => tell(failed, Reason::NothingToUndo),
                 Some(above) => match foreign(above, request) {
                     Some(id) => tell(failed, Reason::NeedsForce(id)),
-                    None => Resolved::Op(Op::UndoTo(left)),
+                    None => ResolvedRequest::Op(Op::UndoTo(left)),
                 },
             }
         }
@@ -336,7 +336,7 @@ fn resolve<'a>(
             }
             match may_commit(&world.stack, request.requester, force) {
                 Err(held) => tell(failed, Reason::Refused(vec![held])),
-                Ok(()) => Resolved::Commit,
+                Ok(()) => ResolvedRequest::Commit,
             }
         }
     }

@@ -1,7 +1,7 @@
 //! Who waits for whom: batches that have come, in the order in which they begin (semantics: *Requests*).
 //!
 //! A batch begins when no earlier one, under way or waiting, claims anything of what it claims, and when the one before of
-//! the same coordinator, or of the same connection of an operator, is over. Then it has all of that until its last request is answered. So no circle of waits can
+//! the same coordinator, or of the same connection of an operator, is over. Then it has all of that until its last request is answered. So no cycle of waits can
 //! arise, and none starves.
 
 use super::claims::{Claim, Claims};
@@ -13,7 +13,7 @@ use std::collections::VecDeque;
 
 /// A batch that has begun, by the number under which it is under way.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub struct Turn {
+pub struct ActiveBatch {
     /// The number: the smallest that was free.
     pub number: u32,
     /// Its requests that are not answered yet, arranged.
@@ -50,7 +50,7 @@ pub struct Gone {
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Default)]
 pub struct Desk {
     waiting: VecDeque<Batch>,
-    under_way: Vec<Turn>,
+    under_way: Vec<ActiveBatch>,
 }
 
 /// What comes of a batch that has just come, beside what waits.
@@ -91,7 +91,7 @@ impl Desk {
     }
 
     /// Batches that have begun.
-    pub fn under_way(&self) -> &[Turn] {
+    pub fn under_way(&self) -> &[ActiveBatch] {
         &self.under_way
     }
 
@@ -134,7 +134,7 @@ impl Desk {
         for safe in &arrival.safe {
             let Ask::Apply(id) = safe.ask else { continue };
             // What is behind in a batch under way was asked for before as well.
-            let behind = self.under_way.iter_mut().flat_map(|turn| &mut turn.batch.requests);
+            let behind = self.under_way.iter_mut().flat_map(|active| &mut active.batch.requests);
             kept.requests.iter_mut().chain(behind.filter(|r| concerns(id, r))).for_each(|request| request.still = true);
             for request in self.cancel_waiting(|request| concerns(id, request)) {
                 let verdict = if request.ask.is_undo() { Verdict::UndoFailed } else { Verdict::Cancelled };
@@ -164,10 +164,11 @@ impl Desk {
     /// What is under way and is given up by an undo, unless a request between them claims the same: then the undo waits its
     /// turn.
     fn given_up_by(&self, id: ConfigId, undo: &Request, claims: &Claims) -> Option<u32> {
-        let turn = self.under_way.iter().find(|turn| turn.batch.requests.iter().any(|r| takes_back(undo, r, id)))?;
-        let claim = claims.of(&turn.batch.requests);
+        let active =
+            self.under_way.iter().find(|active| active.batch.requests.iter().any(|r| takes_back(undo, r, id)))?;
+        let claim = claims.of(&active.batch.requests);
         let between = self.waiting.iter().any(|batch| claims.of(&batch.requests).meets(&claim));
-        (!between).then_some(turn.number)
+        (!between).then_some(active.number)
     }
 
     /// Takes out what waits and `out` says so of.
@@ -187,7 +188,7 @@ impl Desk {
     }
 
     /// The next batch that may begin; it is under way from now on. `alone` says which would begin alone.
-    pub fn turn(&mut self, claims: &Claims, alone: impl Fn(&Batch) -> bool) -> Option<&Turn> {
+    pub fn begin_next(&mut self, claims: &Claims, alone: impl Fn(&Batch) -> bool) -> Option<&ActiveBatch> {
         let at = if self.under_way.is_empty() {
             // Whatever else waits came later.
             (!self.waiting.is_empty()).then_some(0)
@@ -195,18 +196,18 @@ impl Desk {
             self.free(claims, &alone)
         }?;
         let batch = self.waiting.remove(at)?;
-        let number = (0..).find(|n| self.under_way.iter().all(|turn| turn.number != *n))?;
+        let number = (0..).find(|n| self.under_way.iter().all(|active| active.number != *n))?;
         let alone = alone(&batch);
-        self.under_way.push(Turn { number, batch, given_up: Vec::new(), alone });
+        self.under_way.push(ActiveBatch { number, batch, given_up: Vec::new(), alone });
         self.under_way.last()
     }
 
     fn free(&self, claims: &Claims, alone: impl Fn(&Batch) -> bool) -> Option<usize> {
-        let mut held = claims.of(self.under_way.iter().flat_map(|turn| &turn.batch.requests));
-        if self.under_way.iter().any(|turn| turn.alone) {
+        let mut held = claims.of(self.under_way.iter().flat_map(|active| &active.batch.requests));
+        if self.under_way.iter().any(|active| active.alone) {
             held.join(&Claim::all());
         }
-        let mut asking: Vec<Line> = self.under_way.iter().filter_map(|turn| line(&turn.batch)).collect();
+        let mut asking: Vec<Line> = self.under_way.iter().filter_map(|active| line(&active.batch)).collect();
         for (at, batch) in self.waiting.iter().enumerate() {
             let claim = if alone(batch) { Claim::all() } else { claims.of(&batch.requests) };
             if !claim.meets(&held) && line(batch).is_none_or(|by| !asking.contains(&by)) {
@@ -219,21 +220,21 @@ impl Desk {
     }
 
     /// A batch under way.
-    pub fn turn_of(&self, number: u32) -> Option<&Turn> {
-        self.under_way.iter().find(|turn| turn.number == number)
+    pub fn active(&self, number: u32) -> Option<&ActiveBatch> {
+        self.under_way.iter().find(|active| active.number == number)
     }
 
     /// An undo gives up what a batch under way asks; its place there. None: another undo of the same step has done so before.
     pub fn give_up(&mut self, number: u32, undo: Request) -> Option<usize> {
-        let turn = self.under_way.iter_mut().find(|turn| turn.number == number)?;
-        let place = given_up_of(&undo, &turn.batch.requests)?;
-        turn.given_up.push(GivenUp { place, undo });
+        let active = self.under_way.iter_mut().find(|active| active.number == number)?;
+        let place = given_up_of(&undo, &active.batch.requests)?;
+        active.given_up.push(GivenUp { place, undo });
         Some(place)
     }
 
     /// A batch that could begin has not done so after all: it is the first that waits, or the last, since it had just come.
     pub fn put_back(&mut self, number: u32, last: bool) {
-        if let Some(at) = self.under_way.iter().position(|turn| turn.number == number) {
+        if let Some(at) = self.under_way.iter().position(|active| active.number == number) {
             let batch = self.under_way.remove(at).batch;
             self.waiting.insert(if last { self.waiting.len() } else { 0 }, batch);
         }
@@ -241,15 +242,15 @@ impl Desk {
 
     /// The first requests of a batch under way are these: what comes later does not change how they are carried out.
     pub fn begun_as(&mut self, number: u32, requests: &[Request]) {
-        if let Some(turn) = self.under_way.iter_mut().find(|turn| turn.number == number) {
-            turn.batch.requests.iter_mut().zip(requests).for_each(|(own, begun)| *own = *begun);
+        if let Some(active) = self.under_way.iter_mut().find(|active| active.number == number) {
+            active.batch.requests.iter_mut().zip(requests).for_each(|(own, begun)| *own = *begun);
         }
     }
 
     /// Every request that is under way, has given something up or waits, in that order.
     pub fn requests_mut(&mut self) -> impl Iterator<Item = &mut Request> {
-        let under_way = self.under_way.iter_mut().flat_map(|turn| {
-            turn.batch.requests.iter_mut().chain(turn.given_up.iter_mut().map(|given_up| &mut given_up.undo))
+        let under_way = self.under_way.iter_mut().flat_map(|active| {
+            active.batch.requests.iter_mut().chain(active.given_up.iter_mut().map(|given_up| &mut given_up.undo))
         });
         under_way.chain(self.waiting.iter_mut().flat_map(|batch| &mut batch.requests))
     }
@@ -257,12 +258,12 @@ impl Desk {
     /// The request at a place of a batch under way is answered so (none: nobody is told).
     pub fn answered(&mut self, number: u32, place: usize, verdict: Option<Verdict>) -> Gone {
         let mut gone = Gone { over: true, ..Gone::default() };
-        let Some(at) = self.under_way.iter().position(|turn| turn.number == number) else { return gone };
-        let turn = &mut self.under_way[at];
-        if place < turn.batch.requests.len() {
-            turn.batch.requests.remove(place);
+        let Some(at) = self.under_way.iter().position(|active| active.number == number) else { return gone };
+        let active = &mut self.under_way[at];
+        if place < active.batch.requests.len() {
+            active.batch.requests.remove(place);
         }
-        turn.given_up.retain_mut(|given_up| {
+        active.given_up.retain_mut(|given_up| {
             if given_up.place == place {
                 match gave_up(verdict.unwrap_or(Verdict::Cancelled)) {
                     Some(answer) => gone.undone.push((given_up.undo, answer)),
@@ -273,7 +274,7 @@ impl Desk {
             given_up.place -= usize::from(given_up.place > place);
             true
         });
-        gone.over = turn.batch.requests.is_empty();
+        gone.over = active.batch.requests.is_empty();
         if gone.over {
             self.under_way.remove(at);
         }
@@ -298,7 +299,7 @@ impl Desk {
 
     /// A batch under way is over, whatever of it was not answered.
     pub fn over(&mut self, number: u32) {
-        self.under_way.retain(|turn| turn.number != number);
+        self.under_way.retain(|active| active.number != number);
     }
 }
 

@@ -8,7 +8,7 @@ use super::{Edits, Frame, FrameId, Inverse, Reason, Request, Stack};
 use crate::model::{Change, Configuration, StateList, Step, codes};
 use crate::plan::footprint::Footprint;
 use crate::plan::undo::{absolute, items};
-use crate::plan::{Context, PlannedStep, SavedValue, plan_on};
+use crate::plan::{PlanContext, PlannedStep, SavedValue, plan_on};
 use crate::system::{Overlay, System};
 use crate::time::Time;
 use rustc_hash::FxHashSet;
@@ -16,7 +16,7 @@ use std::sync::Arc;
 
 /// A safe configuration, planned as far as it goes.
 #[derive(Debug, Clone)]
-pub struct Effort {
+pub struct BestEffort {
     /// What is done.
     pub planned: Planned,
     /// The frame it leaves, without a number.
@@ -32,12 +32,12 @@ pub fn effort(
     configuration: &Configuration,
     request: &Request,
     at: Time,
-    context: &Context,
-) -> Effort {
+    context: &PlanContext,
+) -> BestEffort {
     let op = Op::Push { configuration, requester: request.requester, at, scope: request.scope };
     match transaction(system, stack, &[op], context) {
         Ok(planned) => match planned.parts[0].edits.push.as_deref().cloned() {
-            Some(frame) => Effort { planned, frame, troubles: Vec::new() },
+            Some(frame) => BestEffort { planned, frame, troubles: Vec::new() },
             None => piecewise(system, configuration, request, at, context),
         },
         Err(_) => piecewise(system, configuration, request, at, context),
@@ -63,7 +63,13 @@ pub fn without(frame: Frame, missed: &[Step]) -> Frame {
     Frame { inverse: Inverse::List(items(&done, &saved)), saved, partial: true, ..frame }
 }
 
-fn piecewise(system: &System, configuration: &Configuration, request: &Request, at: Time, context: &Context) -> Effort {
+fn piecewise(
+    system: &System,
+    configuration: &Configuration,
+    request: &Request,
+    at: Time,
+    context: &PlanContext,
+) -> BestEffort {
     let mut view = Overlay::new(system);
     let mut steps: Vec<PlannedStep> = Vec::new();
     let mut troubles = Vec::new();
@@ -126,7 +132,7 @@ fn piecewise(system: &System, configuration: &Configuration, request: &Request, 
     let kept = FxHashSet::default();
     let (of, whole, warnings, popped) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     let planned = Planned { steps, of, whole, parts, revision, warnings, popped, kept };
-    Effort { planned, frame, troubles }
+    BestEffort { planned, frame, troubles }
 }
 
 /// A configuration in parts that can each be refused by itself: entries of the lists and changes, in their order.

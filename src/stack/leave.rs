@@ -9,7 +9,7 @@ use super::share::{self, Hindrance};
 use super::{Frame, FrameId, Inverse, Stack, World};
 use crate::model::Finding;
 use crate::plan::PlannedStep;
-use crate::plan::undo::Item;
+use crate::plan::undo::DraftStep;
 use crate::system::touch::{Slot, slot};
 use crate::system::{View, step};
 use rustc_hash::FxHashSet;
@@ -103,7 +103,7 @@ fn moving(frame: &Frame, frames: &[Arc<Frame>], view: &impl View) -> Option<Stri
             back.flat_map(|planned| planned.undo.steps()).map(ToString::to_string).next()
         }
         Inverse::List(items) => {
-            let goes = |item: &&Item| item.may_stay().is_none_or(|slot| !staying.contains(&slot));
+            let goes = |item: &&DraftStep| item.may_stay().is_none_or(|slot| !staying.contains(&slot));
             let mut back = items.iter().filter(goes);
             back.find(|item| step::moves(&item.step, view)).map(|item| item.step.to_string())
         }

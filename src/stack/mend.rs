@@ -6,11 +6,11 @@
 //! leads to (semantics: *What goes wrong*).
 
 use super::work::{Op, Planned, is_bound, transaction};
-use super::{Broken, Frame, FrameId, HandOver, Seen, World, net};
+use super::{Broken, Frame, FrameId, HandOver, SafeWrites, World, net};
 use crate::model::{ComponentName, MemberRef, Origin, RunState, Step};
 use crate::plan::footprint::{Footprint, Index, Saved, Slot};
-use crate::plan::undo::{Item, Script, absolute};
-use crate::plan::{Context, PlanStage, PlannedStep, SavedValue, StepId};
+use crate::plan::undo::{DraftStep, Script, absolute};
+use crate::plan::{PlanContext, PlanStage, PlannedStep, SavedValue, StepId};
 use crate::system::touch::{Access, touches};
 use crate::system::{Overlay, System, View as _, diff, step};
 use smallvec::SmallVec;
@@ -87,7 +87,8 @@ impl World {
     pub fn is_otherwise(&mut self, mut broken: Broken) {
         let slots = self.overwritten(&broken).map(|(_, saved)| saved.slot);
         let written = slots.filter_map(|slot| Some((slot, broken.expects(slot)?))).collect();
-        broken.seen = self.stack.frames().iter().map(|frame| frame.id).max().map(|newest| Seen { newest, written });
+        broken.seen =
+            self.stack.frames().iter().map(|frame| frame.id).max().map(|newest| SafeWrites { newest, written });
         self.breaks(broken);
     }
 
@@ -238,7 +239,7 @@ impl World {
 
     /// The undo of a frame in one net with what mends what is broken at this place. None: there is nothing that would be
     /// mended to be taken back at once, and each goes by itself.
-    pub fn straight(&self, at: usize, frame: FrameId, context: &Context) -> Option<Planned> {
+    pub fn straight(&self, at: usize, frame: FrameId, context: &PlanContext) -> Option<Planned> {
         let broken = &self.broken[at];
         let wanted = self.as_meant(broken);
         let mend = diff(&self.system, &wanted);
@@ -252,8 +253,8 @@ impl World {
             step::apply(&planned.step, &mut end).ok()?;
         }
         let mends = mend.len();
-        let alone = |step| Item::bare(step, PlanStage::Changes, Origin::NONE);
-        let items = mend.into_iter().map(alone).chain(undo.steps.iter().map(Item::of)).collect();
+        let alone = |step| DraftStep::bare(step, PlanStage::Changes, Origin::NONE);
+        let items = mend.into_iter().map(alone).chain(undo.steps.iter().map(DraftStep::of)).collect();
         let shorter = self.spared(items, mends, &wanted);
         if shorter.iter().filter(|item| (item.of as usize) < mends).count() == mends {
             return None;
@@ -275,9 +276,9 @@ impl World {
 
     /// The net of `items`, of which the first so many mend and the others undo, each with its place among them. A call needs
     /// no run state: nothing moves to be as it was for one, and back.
-    fn spared(&self, mut items: Vec<Item>, mends: usize, wanted: &System) -> Vec<Item> {
+    fn spared(&self, mut items: Vec<DraftStep>, mends: usize, wanted: &System) -> Vec<DraftStep> {
         (0..).zip(&mut items).for_each(|(place, item)| item.of = place);
-        let mended = |item: &Item| (item.of as usize) < mends;
+        let mended = |item: &DraftStep| (item.of as usize) < mends;
         let bound = |property: MemberRef| is_bound(property, &self.system, wanted);
         let mut net = net::reduce(items, Some(&self.system), &bound);
         let mut at = 0;
@@ -286,7 +287,8 @@ impl World {
                 && mended(&net[at])
                 && step::moves(&net[at].step, wanted)
             {
-                let next = |item: &Item| matches!(&item.step, Step::State { component: of, .. } if of == component);
+                let next =
+                    |item: &DraftStep| matches!(&item.step, Step::State { component: of, .. } if of == component);
                 let back = Step::State { component: *component, transition: transition.inverse() };
                 let later = net[at + 1..].iter().position(next).map(|later| at + 1 + later);
                 if let Some(later) = later.filter(|later| net[*later].step == back && !mended(&net[*later])) {
@@ -301,7 +303,7 @@ impl World {
     }
 
     /// The steps, one after the other, if they lead from what is there to `end`.
-    fn leads_to(&self, items: Vec<Item>, end: &System) -> Option<Vec<PlannedStep>> {
+    fn leads_to(&self, items: Vec<DraftStep>, end: &System) -> Option<Vec<PlannedStep>> {
         let mut view = Overlay::new(&self.system);
         let mut script = Script::new(&mut view);
         for item in items {

@@ -31,21 +31,21 @@ mod world;
 
 pub use answer::{Answer, Reason, Residual};
 pub use batch::{Group, Rules, Told, held, keeps_still, may_apply, take_up};
-pub use desk::{Arrival, Arrived, Desk, GivenUp, Gone, Turn, given_up_of};
-pub use effort::{Effort, effort};
+pub use desk::{ActiveBatch, Arrival, Arrived, Desk, GivenUp, Gone, given_up_of};
+pub use effort::{BestEffort, effort};
 pub use net::reduce;
 pub use permanent::may_commit;
-pub use prepared::{Resolved, Switch};
+pub use prepared::{ResolvedStep, Switch};
 pub use request::{Batch, FrameId, Request, Requester, Scope, Why};
 pub use settle::{About, Ending, Endings, SafeEnd, Settled, Stopped, settle};
 pub use share::{HandOver, calls, components, is_kept, shares, staying};
 pub use stands::{is_stood_down, running_for};
 pub use work::{Along, Op, Part, Planned, places, transaction};
-pub use world::{Broken, Seen, World};
+pub use world::{Broken, SafeWrites, World};
 
 use crate::model::{ComponentName, ConfigId, Finding, Ident, RunState, Step, codes};
 use crate::plan::footprint::Footprint;
-use crate::plan::undo::Item;
+use crate::plan::undo::DraftStep;
 use crate::plan::{PlannedStep, SavedValue};
 use crate::time::Time;
 use smallvec::SmallVec;
@@ -69,7 +69,7 @@ pub enum Inverse {
     /// By undoing its steps, last first. They are those of the plan that it came of.
     Steps(Arc<Vec<PlannedStep>>),
     /// By this list: several frames squashed into one, or what is left of one.
-    List(Vec<Item>),
+    List(Vec<DraftStep>),
 }
 
 /// An applied configuration.
@@ -120,7 +120,7 @@ impl Frame {
             Inverse::List(items) => ([].as_slice(), items.as_slice()),
         };
         let undone = steps.iter().rev().flat_map(|done: &PlannedStep| done.undo.steps());
-        let mut back = undone.chain(items.iter().map(|item: &Item| &item.step)).filter_map(|step| match step {
+        let mut back = undone.chain(items.iter().map(|item: &DraftStep| &item.step)).filter_map(|step| match step {
             Step::State { component: of, transition } if *of == component => Some(*transition),
             _ => None,
         });
@@ -158,6 +158,8 @@ pub struct Stack {
     committed: BTreeSet<Buried>,
     bound: usize,
     next: u64,
+    /// What was squashed of which two; shared with its copies.
+    memory: Option<squash::Memory>,
 }
 
 /// How a stack changes when a part of a transaction has ended: frames popped, with what they hand over, and pushed.
@@ -179,7 +181,13 @@ impl Stack {
             committed: BTreeSet::new(),
             bound: bound.max(2),
             next: 1,
+            memory: None,
         }
+    }
+
+    /// The same, and of the same frames it is squashed once, in it and all its copies: for whoever follows thousands of them.
+    pub fn remembering(bound: usize) -> Self {
+        Self { memory: Some(squash::Memory::default()), ..Self::new(bound) }
     }
 
     /// The frames, oldest first.
@@ -282,10 +290,12 @@ impl Stack {
                 let mut frame = frame.clone();
                 Arc::make_mut(&mut frame).id = id;
                 let requester = frame.requester;
+                // Of those who follow thousands of stacks each has only what it needs.
+                self.frames.reserve_exact(1);
                 self.frames.push(frame);
                 busy.extend(waits.then_some(id));
                 // Room was made sure of when it began; where others hold on to frames since, there is one more for a while.
-                squash::fit(&mut self.frames, requester, self.bound, &busy);
+                squash::fit(&mut self.frames, requester, self.bound, &busy, self.memory.as_ref());
             }
         }
         pushed

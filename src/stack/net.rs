@@ -5,22 +5,26 @@
 
 use crate::model::{ComponentName, MemberRef, Step};
 use crate::plan::footprint::Slot;
-use crate::plan::undo::{Item, absolute};
+use crate::plan::undo::{DraftStep, absolute};
 use crate::system::{View, is_so};
 use rustc_hash::{FxHashMap, FxHashSet};
 
 /// The net of `items`. `present` is the system they begin in, where it is known; `bound` tells whether a property may be
 /// set only in certain run states.
-pub fn reduce<V: View>(items: Vec<Item>, present: Option<&V>, bound: &dyn Fn(MemberRef) -> bool) -> Vec<Item> {
+pub fn reduce<V: View>(
+    items: Vec<DraftStep>,
+    present: Option<&V>,
+    bound: &dyn Fn(MemberRef) -> bool,
+) -> Vec<DraftStep> {
     cancel(drop_writes(items, present), bound)
 }
 
 /// Absolute writes: only the last one to a slot counts, none to a component that is destroyed afterwards, and none of the
 /// value that is there. No precondition depends on what a property or a port holds, so leaving one out harms nothing.
-fn drop_writes<V: View>(items: Vec<Item>, present: Option<&V>) -> Vec<Item> {
+fn drop_writes<V: View>(items: Vec<DraftStep>, present: Option<&V>) -> Vec<DraftStep> {
     let mut lives: FxHashMap<ComponentName, (u32, bool)> = FxHashMap::default();
     let mut later: FxHashSet<(Slot, u32)> = FxHashSet::default();
-    let mut kept: Vec<Item> = Vec::with_capacity(items.len());
+    let mut kept: Vec<DraftStep> = Vec::with_capacity(items.len());
     for item in items.into_iter().rev() {
         let component = item.step.component();
         match &item.step {
@@ -62,7 +66,7 @@ fn drop_writes<V: View>(items: Vec<Item>, present: Option<&V>) -> Vec<Item> {
 struct Trail(Vec<usize>);
 
 impl Trail {
-    fn last(&mut self, out: &[Option<Item>]) -> Option<usize> {
+    fn last(&mut self, out: &[Option<DraftStep>]) -> Option<usize> {
         while let Some(at) = self.0.last() {
             if out[*at].is_some() {
                 return Some(*at);
@@ -74,7 +78,7 @@ impl Trail {
 }
 
 #[derive(PartialEq, Eq, Hash, Clone, Copy)]
-enum Kind {
+enum TrailKey {
     /// Moves of a component.
     Moves(ComponentName),
     /// What needs the component's run state as it is there.
@@ -90,20 +94,20 @@ enum Kind {
 }
 
 struct Trails {
-    trails: FxHashMap<Kind, Trail>,
-    out: Vec<Option<Item>>,
+    trails: FxHashMap<TrailKey, Trail>,
+    out: Vec<Option<DraftStep>>,
 }
 
 impl Trails {
-    fn last(&mut self, kind: Kind) -> Option<usize> {
+    fn last(&mut self, kind: TrailKey) -> Option<usize> {
         self.trails.get_mut(&kind).and_then(|t| t.last(&self.out))
     }
 
-    fn since(&mut self, kind: Kind, at: usize) -> bool {
+    fn since(&mut self, kind: TrailKey, at: usize) -> bool {
         self.last(kind).is_some_and(|last| last > at)
     }
 
-    fn push(&mut self, item: Item, kinds: &[Kind]) {
+    fn push(&mut self, item: DraftStep, kinds: &[TrailKey]) {
         for kind in kinds {
             self.trails.entry(*kind).or_default().0.push(self.out.len());
         }
@@ -112,63 +116,63 @@ impl Trails {
 }
 
 /// Pairs that take each other back, where nothing between needs the first.
-fn cancel(items: Vec<Item>, bound: &dyn Fn(MemberRef) -> bool) -> Vec<Item> {
+fn cancel(items: Vec<DraftStep>, bound: &dyn Fn(MemberRef) -> bool) -> Vec<DraftStep> {
     let mut t = Trails { trails: FxHashMap::default(), out: Vec::with_capacity(items.len()) };
     for item in items {
         match &item.step {
             Step::State { component, transition } => {
                 let c = *component;
-                if let Some(at) = t.last(Kind::Moves(c))
-                    && let Some(Item { step: Step::State { transition: before, .. }, .. }) = &t.out[at]
+                if let Some(at) = t.last(TrailKey::Moves(c))
+                    && let Some(DraftStep { step: Step::State { transition: before, .. }, .. }) = &t.out[at]
                     && before.inverse() == *transition
-                    && !t.since(Kind::Needs(c), at)
+                    && !t.since(TrailKey::Needs(c), at)
                 {
                     t.out[at] = None;
                 } else {
-                    t.push(item, &[Kind::Moves(c), Kind::Any(c)]);
+                    t.push(item, &[TrailKey::Moves(c), TrailKey::Any(c)]);
                 }
             }
             Step::PropertySet { property, .. } => {
                 let c = property.component;
                 if bound(*property) {
-                    t.push(item, &[Kind::Needs(c), Kind::Any(c)]);
+                    t.push(item, &[TrailKey::Needs(c), TrailKey::Any(c)]);
                 } else {
-                    t.push(item, &[Kind::Any(c)]);
+                    t.push(item, &[TrailKey::Any(c)]);
                 }
             }
             Step::PortWrite { port, .. } => {
                 let (port, c) = (*port, port.component);
-                t.push(item, &[Kind::Drive(port), Kind::Any(c)]);
+                t.push(item, &[TrailKey::Drive(port), TrailKey::Any(c)]);
             }
             Step::Operation(call) => {
                 let c = call.operation.component;
-                t.push(item, &[Kind::Needs(c), Kind::Any(c)]);
+                t.push(item, &[TrailKey::Needs(c), TrailKey::Any(c)]);
             }
             Step::Create { component, .. } => {
                 let c = *component;
-                t.push(item, &[Kind::Exists(c), Kind::Needs(c), Kind::Any(c)]);
+                t.push(item, &[TrailKey::Exists(c), TrailKey::Needs(c), TrailKey::Any(c)]);
             }
             Step::Destroy { component } => {
                 let c = *component;
                 // Created and destroyed again, with nothing left in between that happened to it.
-                if let Some(at) = t.last(Kind::Exists(c))
-                    && matches!(&t.out[at], Some(Item { step: Step::Create { .. }, .. }))
-                    && !t.since(Kind::Any(c), at)
+                if let Some(at) = t.last(TrailKey::Exists(c))
+                    && matches!(&t.out[at], Some(DraftStep { step: Step::Create { .. }, .. }))
+                    && !t.since(TrailKey::Any(c), at)
                 {
                     t.out[at] = None;
                 } else {
-                    t.push(item, &[Kind::Exists(c), Kind::Needs(c), Kind::Any(c)]);
+                    t.push(item, &[TrailKey::Exists(c), TrailKey::Needs(c), TrailKey::Any(c)]);
                 }
             }
             Step::Connect { from, to, .. } | Step::Disconnect { from, to } => {
                 let (from, to) = (*from, *to);
-                if let Some(at) = t.last(Kind::Link(from, to))
+                if let Some(at) = t.last(TrailKey::Link(from, to))
                     && undone(&mut t, at, &item, from, to)
                 {
                     t.out[at] = None;
                 } else {
                     let (a, b) = (from.component, to.component);
-                    t.push(item, &[Kind::Link(from, to), Kind::Drive(to), Kind::Any(a), Kind::Any(b)]);
+                    t.push(item, &[TrailKey::Link(from, to), TrailKey::Drive(to), TrailKey::Any(a), TrailKey::Any(b)]);
                 }
             }
         }
@@ -177,8 +181,8 @@ fn cancel(items: Vec<Item>, bound: &dyn Fn(MemberRef) -> bool) -> Vec<Item> {
 }
 
 /// Whether `item` takes back the step at `at` on the same connection.
-fn undone(t: &mut Trails, at: usize, item: &Item, from: MemberRef, to: MemberRef) -> bool {
-    if t.since(Kind::Exists(from.component), at) || t.since(Kind::Exists(to.component), at) {
+fn undone(t: &mut Trails, at: usize, item: &DraftStep, from: MemberRef, to: MemberRef) -> bool {
+    if t.since(TrailKey::Exists(from.component), at) || t.since(TrailKey::Exists(to.component), at) {
         return false;
     }
     let before = t.out[at].as_ref();
@@ -187,7 +191,7 @@ fn undone(t: &mut Trails, at: usize, item: &Item, from: MemberRef, to: MemberRef
         (Some((Step::Connect { .. }, _)), Step::Disconnect { .. }) => true,
         // A connection more in between: only what needs the in-port undriven, or drives it, minds.
         (Some((Step::Disconnect { .. }, Some(was))), Step::Connect { policy, .. }) => {
-            was == *policy && !t.since(Kind::Drive(to), at)
+            was == *policy && !t.since(TrailKey::Drive(to), at)
         }
         _ => false,
     }

@@ -11,7 +11,7 @@ use crate::model::{ComponentName, Configuration, RunState, Step, Target, Value};
 use crate::plan::footprint::{Saved, Slot};
 use crate::plan::undo::absolute;
 use crate::plan::{PlannedStep, SavedValue};
-use crate::system::{Place, System, Undo, View};
+use crate::system::{SlotHandle, System, Undo, View};
 use crate::time::Time;
 use petgraph::stable_graph::NodeIndex;
 use std::collections::BTreeMap;
@@ -19,7 +19,7 @@ use std::sync::Arc;
 
 /// A component that a plan touches: which one it was, and its run state before the plan and after it.
 #[derive(Debug, Clone, Copy)]
-struct Seen {
+struct TouchedComponent {
     at: NodeIndex,
     born: u64,
     before: RunState,
@@ -32,20 +32,20 @@ pub struct Switch {
     /// The frame that it leads to. In force, it is the very one on the stack: whatever changes a frame there leaves this one
     /// as it is, and it is not found there any more.
     frame: Arc<Frame>,
-    seen: Vec<Seen>,
+    seen: Vec<TouchedComponent>,
     /// Where its steps are done.
-    places: Vec<Place>,
+    places: Vec<SlotHandle>,
     /// Where its saved values are.
-    slots: Vec<Place>,
+    slots: Vec<SlotHandle>,
 }
 
 /// A step that is done next, resolved.
 #[derive(Debug, Clone, Copy)]
-pub struct Resolved<'s> {
+pub struct ResolvedStep<'s> {
     /// The step.
     pub step: &'s Step,
     /// Where it is done.
-    pub place: Place,
+    pub place: SlotHandle,
     /// Its number in the [universe](Switch::universe).
     pub index: usize,
     /// The value that replaces that step's own.
@@ -78,14 +78,14 @@ impl Switch {
             let at = system.index_of(name)?;
             let node = system.node_at(at).filter(|node| node.state != RunState::Faulted)?;
             let after = moved.get(&name).copied().unwrap_or(node.state);
-            Some(Seen { at, born: node.born, before: node.state, after })
+            Some(TouchedComponent { at, born: node.born, before: node.state, after })
         };
         let seen = components(&frame.footprint).into_iter().map(see).collect::<Option<_>>()?;
         let place = |planned: &PlannedStep| {
-            Place::of(absolute(&planned.step).unwrap_or(Slot::State(planned.step.component())), system)
+            SlotHandle::of(absolute(&planned.step).unwrap_or(Slot::State(planned.step.component())), system)
         };
         let places = frame.steps().iter().map(place).collect::<Option<_>>()?;
-        let slots = frame.saved.iter().map(|saved| Place::of(saved.slot, system)).collect::<Option<_>>()?;
+        let slots = frame.saved.iter().map(|saved| SlotHandle::of(saved.slot, system)).collect::<Option<_>>()?;
         Some(Self { frame, seen, places, slots })
     }
 
@@ -108,21 +108,21 @@ impl Switch {
     }
 
     /// The step that is done as the `nth` when it is applied or undone.
-    pub fn step(&self, nth: usize, undoing: bool) -> Option<Resolved<'_>> {
+    pub fn step(&self, nth: usize, undoing: bool) -> Option<ResolvedStep<'_>> {
         let steps = self.frame.steps();
         let at = if undoing { steps.len().checked_sub(nth + 1)? } else { nth };
         let planned = steps.get(at)?;
         let step = if undoing { planned.undo.steps().first()? } else { &planned.step };
-        Some(Resolved { step, place: self.places[at], index: 2 * at + usize::from(undoing), value: written(step) })
+        Some(ResolvedStep { step, place: self.places[at], index: 2 * at + usize::from(undoing), value: written(step) })
     }
 
     /// Whether planning it on `system` would give these steps; `undoing`: whether `system` is as they left it.
     pub fn fits(&self, system: &System, undoing: bool) -> bool {
-        let as_seen = |seen: &Seen| {
+        let as_seen = |seen: &TouchedComponent| {
             let state = if undoing { seen.after } else { seen.before };
             system.node_at(seen.at).is_some_and(|node| node.born == seen.born && node.state == state)
         };
-        let as_saved = |(saved, place): (&SavedValue, &Place)| {
+        let as_saved = |(saved, place): (&SavedValue, &SlotHandle)| {
             let held = place.held(saved.slot, system);
             let there = match &saved.value {
                 _ if saved.step => held == written(&self.frame.steps()[saved.at as usize].step),

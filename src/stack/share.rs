@@ -6,7 +6,7 @@ use super::{Frame, FrameId, Inverse};
 use crate::model::{Call, ChangeKind, ComponentName, Configuration, Finding, MemberRef, Step, codes};
 use crate::plan::SavedValue;
 use crate::plan::footprint::{Access, Footprint, Index, Saved, Slot, Touch};
-use crate::plan::undo::{Item, absolute, restoring};
+use crate::plan::undo::{DraftStep, absolute, restoring};
 use crate::system::Undo;
 use rustc_hash::{FxHashMap, FxHashSet};
 use std::sync::Arc;
@@ -62,7 +62,7 @@ pub fn calls(frame: &Frame) -> impl Iterator<Item = MemberRef> + '_ {
         Step::Operation(call) if planned.undo != Undo::Nothing => Some(called(call)),
         _ => None,
     });
-    done.chain(items.iter().filter_map(Item::takes_back_call).map(called))
+    done.chain(items.iter().filter_map(DraftStep::takes_back_call).map(called))
 }
 
 /// The operations whose calls stay, since safe ones among these frames have called them.

@@ -5,18 +5,77 @@ use super::{Frame, FrameId, Inverse, Requester, share};
 use crate::limits;
 use crate::model::{MemberRef, Step};
 use crate::plan::footprint::{Footprint, Slot, Touch};
-use crate::plan::undo::{Item, items};
+use crate::plan::undo::{DraftStep, items};
 use crate::system::System;
-use rustc_hash::FxHashSet;
+use rustc_hash::{FxHashMap, FxHashSet};
 use std::collections::BTreeSet;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// So many squashed frames are remembered.
+const REMEMBERED: usize = 4096;
+
+/// What was squashed of which two, for whoever follows thousands of stacks that have the same frames at the bottom.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Memory(Arc<Mutex<FxHashMap<[usize; 2], Remembered>>>);
+
+#[derive(Debug)]
+struct Remembered {
+    made: Arc<Frame>,
+    /// They stay for as long as they are known by their addresses.
+    _of: [Arc<Frame>; 2],
+}
+
+impl Memory {
+    fn squash(&self, lower: &Arc<Frame>, upper: &Arc<Frame>) -> Arc<Frame> {
+        let key = [lower, upper].map(|frame| Arc::as_ptr(frame) as usize);
+        let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(remembered) = known.get(&key) {
+            return remembered.made.clone();
+        }
+        let made = Arc::new(squash(lower, upper));
+        if known.len() >= REMEMBERED {
+            known.clear();
+        }
+        known.insert(key, Remembered { made: made.clone(), _of: [lower.clone(), upper.clone()] });
+        made
+    }
+}
+
+/// Whether `requester` can be brought to at most `bound` frames.
+pub(super) fn fits(
+    frames: &[Arc<Frame>],
+    requester: Requester,
+    bound: usize,
+    busy: &[FrameId],
+    memory: Option<&Memory>,
+) -> bool {
+    let own = frames.iter().filter(|frame| frame.requester == requester).count();
+    // What the last two of them become is nobody's to know yet.
+    match own.checked_sub(bound + 1) {
+        None => true,
+        Some(0) => pair(frames, requester, busy).is_some(),
+        Some(_) => {
+            let mut frames = frames.to_vec();
+            fit(&mut frames, requester, bound + 1, busy, memory) && pair(&frames, requester, busy).is_some()
+        }
+    }
+}
 
 /// Squashes until `requester` has at most `bound` frames; `busy` ones stay as they are. False: no two could be squashed.
-pub(super) fn fit(frames: &mut Vec<Arc<Frame>>, requester: Requester, bound: usize, busy: &[FrameId]) -> bool {
+pub(super) fn fit(
+    frames: &mut Vec<Arc<Frame>>,
+    requester: Requester,
+    bound: usize,
+    busy: &[FrameId],
+    memory: Option<&Memory>,
+) -> bool {
     while frames.iter().filter(|f| f.requester == requester).count() > bound {
         let Some((lower, upper)) = pair(frames, requester, busy) else { return false };
         let upper = frames.remove(upper);
-        frames[lower] = Arc::new(squash(&frames[lower], &upper));
+        frames[lower] = match memory {
+            Some(memory) => memory.squash(&frames[lower], &upper),
+            None => Arc::new(squash(&frames[lower], &upper)),
+        };
     }
     true
 }
@@ -50,7 +109,7 @@ fn pair(frames: &[Arc<Frame>], requester: Requester, busy: &[FrameId]) -> Option
 }
 
 /// The list that takes a frame back.
-pub(super) fn list(frame: &Frame) -> Vec<Item> {
+pub(super) fn list(frame: &Frame) -> Vec<DraftStep> {
     match &frame.inverse {
         Inverse::Steps(steps) => items(steps, &frame.saved),
         Inverse::List(list) => list.clone(),
@@ -86,7 +145,7 @@ pub(super) fn squash(lower: &Frame, upper: &Frame) -> Frame {
                 _ => None,
             })
             .collect();
-        let whole: Vec<Item> = list(upper).into_iter().chain(list(lower)).collect();
+        let whole: Vec<DraftStep> = list(upper).into_iter().chain(list(lower)).collect();
         inverse = reduce::<System>(whole, None, &|property| bound.contains(&property));
         let calls = inverse.iter().filter(|item| matches!(item.step, Step::Operation(_))).count();
         if calls > limits::SQUASHED_CALLS {

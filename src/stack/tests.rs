@@ -2,7 +2,7 @@
 
 use super::{FrameId, Op, Planned, Requester, Scope, Stack, Switch, transaction};
 use crate::model::*;
-use crate::plan::{Context, Refusal};
+use crate::plan::{PlanContext, Refusal};
 use crate::system::{System, View, step};
 use crate::time::Time;
 use std::collections::BTreeMap;
@@ -100,7 +100,7 @@ impl Bench {
     }
 
     fn ask(&self, requests: &[Op<'_>]) -> Result<Planned, Refusal> {
-        transaction(&self.system, &self.stack, requests, &Context::default())
+        transaction(&self.system, &self.stack, requests, &PlanContext::default())
     }
 
     /// Executes, and answers the steps and the frames pushed.
@@ -357,7 +357,7 @@ fn an_undo_by_leaving_a_state_that_is_refused_leaves_a_frame_like_others() {
     bench.ok(&[Op::Push { configuration: &low, requester: Requester::Operator, at: Time(0), scope }]);
     bench.ok(&[push(&high)]);
     let configurations = [low, high].into_iter().map(|c| (c.id, c)).collect();
-    let context = Context::default();
+    let context = PlanContext::default();
     let rules = super::Rules {
         configurations: &configurations,
         context: &context,
@@ -390,7 +390,7 @@ fn an_undo_by_leaving_a_state_is_about_the_visit_that_was_left() {
     }
     let ids: Vec<FrameId> = bench.stack.frames().iter().map(|frame| frame.id).collect();
     let configurations = std::iter::once((later.id, later)).collect();
-    let context = Context::default();
+    let context = PlanContext::default();
     let rules = super::Rules {
         configurations: &configurations,
         context: &context,
@@ -427,7 +427,7 @@ fn what_has_given_up_a_request_goes_with_its_answer() {
     let under_way = || {
         let mut desk = super::Desk::default();
         let _ = desk.arrive((0..3).map(apply).collect(), |_| false, &claims);
-        let number = desk.turn(&claims, |_| false).expect("nothing is in its way").number;
+        let number = desk.begin_next(&claims, |_| false).expect("nothing is in its way").number;
         assert_eq!([1, 2, 1].map(|n| desk.give_up(number, undo(n))), [Some(1), Some(2), Some(1)]);
         (desk, number)
     };
@@ -441,7 +441,7 @@ fn what_has_given_up_a_request_goes_with_its_answer() {
     let (mut desk, number) = under_way();
     let gone = desk.answered(number, 1, Some(Verdict::Cancelled));
     assert_eq!(gone.undone[..], [(undo(1), Verdict::Undone), (undo(1), Verdict::Undone)]);
-    assert_eq!(desk.turn_of(number).unwrap().given_up[0].place, 1);
+    assert_eq!(desk.active(number).unwrap().given_up[0].place, 1);
     let gone = desk.answered(number, 1, Some(Verdict::Broken));
     assert_eq!((gone.undone[..].to_vec(), gone.over), (vec![(undo(2), Verdict::UndoBroken)], false));
     assert!(desk.answered(number, 0, Some(Verdict::Ok)).over && desk.is_empty());

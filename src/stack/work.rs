@@ -4,8 +4,8 @@ use super::share::{self, HandOver};
 use super::{Edits, Frame, FrameId, Inverse, Requester, Scope, Stack, net, newest, squash};
 use crate::model::finding::count;
 use crate::model::{ConfigId, Configuration, Finding, Findings, MemberRef, OnFailure, Tunable, codes};
-use crate::plan::undo::{Item, Script, undo};
-use crate::plan::{Context, Plan, PlannedStep, Refusal, StepId, plan_on};
+use crate::plan::undo::{DraftStep, Script, undo};
+use crate::plan::{Plan, PlanContext, PlannedStep, Refusal, StepId, plan_on};
 use crate::system::{Overlay, System, View, Violation};
 use crate::time::Time;
 use rustc_hash::FxHashSet;
@@ -104,7 +104,7 @@ impl Planned {
         if self.whole.is_empty() {
             u32::try_from(step).ok()
         } else {
-            self.of.get(step).copied().filter(|of| *of != Item::NOWHERE)
+            self.of.get(step).copied().filter(|of| *of != DraftStep::NOWHERE)
         }
     }
 
@@ -120,7 +120,7 @@ impl Planned {
 ///
 /// # Errors
 /// [`Refusal`], with the place of the refused operation.
-pub fn transaction(system: &System, stack: &Stack, ops: &[Op<'_>], context: &Context) -> Result<Planned, Refusal> {
+pub fn transaction(system: &System, stack: &Stack, ops: &[Op<'_>], context: &PlanContext) -> Result<Planned, Refusal> {
     let mut view = Overlay::new(system);
     let mut work = Work::new(&mut view, stack);
     for (i, op) in ops.iter().enumerate() {
@@ -194,7 +194,7 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
     ///
     /// # Errors
     /// [`Refusal`]; what is in the making is then of no further use.
-    pub(super) fn add(&mut self, op: &Op<'_>, context: &Context) -> Result<(), Refusal> {
+    pub(super) fn add(&mut self, op: &Op<'_>, context: &PlanContext) -> Result<(), Refusal> {
         if let Some(lone) = self.lone.take() {
             self.script.append(lone.iter().cloned());
         }
@@ -317,7 +317,7 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
         requester: Requester,
         at: Time,
         scope: Option<Scope>,
-        context: &Context,
+        context: &PlanContext,
         edits: &mut Edits,
     ) -> Result<(), Refusal> {
         if let Some(group) = configuration.group {
@@ -411,8 +411,8 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
             let Some(frame) = frames.iter().find(|frame| frame.id == *id) else { continue };
             let taken = room.places.iter().filter(|by| **by == frame.requester).count();
             let own = taken + frames.iter().filter(|f| f.requester == frame.requester).count();
-            let fits = || squash::fit(&mut frames.clone(), frame.requester, stack.bound.saturating_sub(taken), &busy);
-            if own > stack.bound && !fits() {
+            let bound = stack.bound.saturating_sub(taken);
+            if own > stack.bound && !squash::fits(&frames, frame.requester, bound, &busy, stack.memory.as_ref()) {
                 let message =
                     format!("`{}` would have {}, and none can be squashed", frame.requester, count(own, "frame"));
                 let finding = Finding::error(codes::STACK_FULL, message)
@@ -452,7 +452,7 @@ pub(super) fn is_bound(property: MemberRef, now: &impl View, end: &impl View) ->
 /// The net of `whole` with the places of its steps in it, when it ends in the same system (`end`) and is shorter.
 fn shorter(system: &System, end: &Overlay<'_>, whole: &[PlannedStep]) -> Option<(Vec<PlannedStep>, Vec<u32>)> {
     let bound = |property: MemberRef| is_bound(property, system, end);
-    let reduced = net::reduce(whole.iter().map(Item::of).collect(), Some(system), &bound);
+    let reduced = net::reduce(whole.iter().map(DraftStep::of).collect(), Some(system), &bound);
     if reduced.len() >= whole.len() {
         return None;
     }

@@ -24,12 +24,12 @@ pub struct Broken {
     pub expected: Snapshot,
     /// What safe configurations had done, where what is broken was seen by looking: the model had that too. None: what is there
     /// of theirs is as they left it.
-    pub seen: Option<Seen>,
+    pub seen: Option<SafeWrites>,
 }
 
 /// What safe configurations in force had done when something was seen that is otherwise.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Seen {
+pub struct SafeWrites {
     /// The newest frame of that time.
     pub newest: FrameId,
     /// What they had written.

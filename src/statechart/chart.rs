@@ -76,7 +76,7 @@ impl EventId {
 
 /// What a node is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Kind {
+pub enum NodeKind {
     /// A state without child nodes.
     Leaf,
     /// A state with child nodes.
@@ -109,7 +109,7 @@ pub(super) const NONE: u32 = u32::MAX;
 pub(super) struct NodeRow {
     pub parent: u32,
     pub depth: u32,
-    pub kind: Kind,
+    pub kind: NodeKind,
     /// Its outgoing transitions in the order in which they are tried.
     pub out: Span,
     pub entry: Span,
@@ -174,7 +174,7 @@ pub(super) struct TimerRow {
 
 /// When a name is raised.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum When {
+pub enum RaiseMoment {
     /// On entry of the state: by `entry`, or to push a state-scoped configuration.
     Entry(NodeId),
     /// On exit of the state: by `exit`, or to undo a state-scoped configuration.
@@ -189,7 +189,7 @@ pub struct RaiseSite {
     /// The name.
     pub name: EventName,
     /// When it is raised.
-    pub when: When,
+    pub when: RaiseMoment,
     /// It comes from a state-scoped configuration.
     pub scoped: bool,
     /// Where it was written.
@@ -277,13 +277,13 @@ impl Chart {
     }
 
     /// What a node is.
-    pub fn kind(&self, node: NodeId) -> Kind {
+    pub fn kind(&self, node: NodeId) -> NodeKind {
         self.nodes[node.index()].kind
     }
 
     /// Whether a node is a state (else it is a connector).
     pub fn is_state(&self, node: NodeId) -> bool {
-        self.kind(node) != Kind::Connector
+        self.kind(node) != NodeKind::Connector
     }
 
     /// The state around a node; none for the root.

@@ -1,18 +1,18 @@
 //! What is wrong or doubtful in a chart whose references are all good.
 
-use super::chart::{Chart, EventId, Kind, NONE};
+use super::chart::{Chart, EventId, NONE, NodeKind};
 use super::hook::Nobody;
 use super::{EdgeId, NodeId};
-use super::{Machine, TurnResult};
+use super::{Machine, MicrostepResult};
 use crate::limits;
 use crate::model::codes;
 use crate::model::finding::{Finding, Findings};
 use crate::time::Time;
 use rustc_hash::FxHashMap;
 
-/// Errors: circles of connectors that nothing holds, and chains of connectors that are too long to search. Warnings: circles
+/// Errors: cycles of connectors that nothing holds, and chains of connectors that are too long to search. Warnings: cycles
 /// that the events of one step can open.
-pub(super) fn connector_circles(chart: &Chart, findings: &mut Findings) {
+pub(super) fn connector_cycles(chart: &Chart, findings: &mut Findings) {
     // Each alone: what is closed in one may hide what is in the other.
     walk_connectors(chart, true, findings);
     walk_connectors(chart, false, findings);
@@ -29,12 +29,12 @@ fn walk_connectors(chart: &Chart, null: bool, findings: &mut Findings) {
         chart.nodes[node as usize].out.ids().filter(|edge| {
             let row = &chart.edges[*edge as usize];
             let held = row.guard.is_some() || row.predicates.len > 0 || (null && !row.null);
-            !held && chart.nodes[row.tgt as usize].kind == Kind::Connector
+            !held && chart.nodes[row.tgt as usize].kind == NodeKind::Connector
         })
     };
     let mut too_long = None;
     for start in 0..u32::try_from(chart.nodes.len()).unwrap_or(NONE) {
-        if chart.nodes[start as usize].kind != Kind::Connector || mark[start as usize] != UNSEEN {
+        if chart.nodes[start as usize].kind != NodeKind::Connector || mark[start as usize] != UNSEEN {
             continue;
         }
         // Each with the transition that led to it.
@@ -62,10 +62,10 @@ fn walk_connectors(chart: &Chart, null: bool, findings: &mut Findings) {
                 }
                 OPEN => {
                     let from = open.iter().position(|step| step.0 == target).unwrap_or(0);
-                    let circle: Vec<NodeId> = open[from..].iter().map(|step| NodeId(step.0)).collect();
+                    let cycle: Vec<NodeId> = open[from..].iter().map(|step| NodeId(step.0)).collect();
                     let mut edges: Vec<u32> = open[from + 1..].iter().map(|step| step.2).collect();
                     edges.push(edge);
-                    findings.extend(circle_finding(chart, &circle, &edges, null));
+                    findings.extend(cycle_finding(chart, &cycle, &edges, null));
                 }
                 _ => {
                     let longest = length[target as usize] + 1;
@@ -92,15 +92,15 @@ fn walk_connectors(chart: &Chart, null: bool, findings: &mut Findings) {
     }
 }
 
-/// Of a circle that needs no event: an error. Of one that does: a warning, with what opens it.
-fn circle_finding(chart: &Chart, circle: &[NodeId], edges: &[u32], null: bool) -> Option<Finding> {
-    let mut names: Vec<String> = circle.iter().map(|node| format!("`{}`", chart.fqn(*node))).collect();
+/// Of a cycle that needs no event: an error. Of one that does: a warning, with what opens it.
+fn cycle_finding(chart: &Chart, cycle: &[NodeId], edges: &[u32], null: bool) -> Option<Finding> {
+    let mut names: Vec<String> = cycle.iter().map(|node| format!("`{}`", chart.fqn(*node))).collect();
     names.extend(names.first().cloned());
     let round = format!("connectors lead round in a circle: {}", names.join(" → "));
     let closing = EdgeId(*edges.last()?);
     let at = |finding: Finding| {
         let finding = finding.at(chart.edge_origin(closing)).labelled("this transition closes the circle");
-        finding.path(chart.fqn(circle[0]).to_string())
+        finding.path(chart.fqn(cycle[0]).to_string())
     };
     if null {
         let finding = Finding::error(codes::CHART_CONNECTOR_CIRCLE, round);
@@ -338,12 +338,12 @@ fn never_fails(chart: &Chart, edge: u32, always: &mut [Option<bool>]) -> bool {
         return false;
     }
     match chart.nodes[row.tgt as usize].kind {
-        Kind::Leaf => true,
-        Kind::Composite => false,
-        Kind::Connector => match always[row.tgt as usize] {
+        NodeKind::Leaf => true,
+        NodeKind::Composite => false,
+        NodeKind::Connector => match always[row.tgt as usize] {
             Some(known) => known,
             None => {
-                // Chains without guards and events are bounded and have no circles.
+                // Chains without guards and events are bounded and have no cycles.
                 let found = chart.nodes[row.tgt as usize].out.ids().any(|edge| never_fails(chart, edge, always));
                 always[row.tgt as usize] = Some(found);
                 found
@@ -353,7 +353,7 @@ fn never_fails(chart: &Chart, edge: u32, always: &mut [Option<bool>]) -> bool {
 }
 
 fn root_exit(chart: &Chart, findings: &mut Findings) {
-    if let Some(site) = chart.raises.iter().find(|site| site.when == super::When::Exit(NodeId::ROOT)) {
+    if let Some(site) = chart.raises.iter().find(|site| site.when == super::RaiseMoment::Exit(NodeId::ROOT)) {
         findings.push(
             Finding::warning(
                 codes::CHART_ROOT_EXIT,
@@ -367,7 +367,7 @@ fn root_exit(chart: &Chart, findings: &mut Findings) {
 }
 
 fn not_entered(chart: &Chart, findings: &mut Findings) {
-    if Machine::new(chart).turn(chart, Time::default(), &mut Nobody) == TurnResult::NotEntered {
+    if Machine::new(chart).microstep(chart, Time::default(), &mut Nobody) == MicrostepResult::NotEntered {
         let initial = NodeId(chart.initial);
         findings.push(
             Finding::warning(codes::CHART_NOT_ENTERED, "no path leads from the initial connector without an event")
@@ -378,19 +378,19 @@ fn not_entered(chart: &Chart, findings: &mut Findings) {
     }
 }
 
-/// Leaves whose completions lead round in a circle.
+/// Leaves whose completions lead round in a cycle.
 fn endless(chart: &Chart, reached: &[bool], findings: &mut Findings) {
     let mut machine = Machine::new(chart);
     let mut next = vec![NONE; chart.nodes.len()];
     let goes_on = |n: &NodeId| reached[n.index()] && !chart.nodes[n.index()].settles;
-    for leaf in chart.nodes().filter(|n| chart.kind(*n) == Kind::Leaf && goes_on(n)) {
+    for leaf in chart.nodes().filter(|n| chart.kind(*n) == NodeKind::Leaf && goes_on(n)) {
         machine.place(chart, leaf, Time::default());
         machine.send(chart.completion(leaf));
-        if machine.turn(chart, Time::default(), &mut Nobody) == TurnResult::Taken {
+        if machine.microstep(chart, Time::default(), &mut Nobody) == MicrostepResult::Taken {
             next[leaf.index()] = machine.leaf().map_or(NONE, |leaf| leaf.0);
         }
     }
-    // Follow each chain once; one that meets itself closed a circle.
+    // Follow each chain once; one that meets itself closed a cycle.
     let mut seen = vec![NONE; chart.nodes.len()];
     for start in 0..u32::try_from(next.len()).unwrap_or(NONE) {
         let mut at = start;
@@ -401,9 +401,9 @@ fn endless(chart: &Chart, reached: &[bool], findings: &mut Findings) {
         if at == NONE || seen[at as usize] != start || next[at as usize] == NONE {
             continue;
         }
-        let circle = std::iter::successors(Some(next[at as usize]), |n| Some(next[*n as usize]));
+        let cycle = std::iter::successors(Some(next[at as usize]), |n| Some(next[*n as usize]));
         let mut names = vec![format!("`{}`", chart.fqn(NodeId(at)))];
-        for node in circle {
+        for node in cycle {
             names.push(format!("`{}`", chart.fqn(NodeId(node))));
             if node == at || names.len() > 8 {
                 break;

@@ -1,11 +1,11 @@
 //! From a chart as written to tables: what rFSM's `init` does (`docs/rfsm.md` §2), with all faults said at once.
 //!
-//! What `init` rejects is an error here. What it only complains about is a warning. Beyond rFSM, circles of connectors
+//! What `init` rejects is an error here. What it only complains about is a warning. Beyond rFSM, cycles of connectors
 //! (which overflow its stack) and transitions of the root (on which it trips) are refused.
 
 mod tables;
 
-use super::chart::{ActionOp, Chart, EventId, Kind, NONE, RaiseSite};
+use super::chart::{ActionOp, Chart, EventId, NONE, NodeKind, RaiseSite};
 use super::reactions::ReactionTable;
 use super::resolve::ResolvedNames;
 use super::wide::Wide;
@@ -14,7 +14,7 @@ use crate::limits;
 use crate::model::codes;
 use crate::model::finding::{self, Finding, Findings, Origin};
 use crate::model::names::{EventName, Ident};
-use crate::model::statechart::{INITIAL, Node, ROOT, State, Statechart, Transition};
+use crate::model::statechart::{ChartNode, ChartTransition, INITIAL, ROOT, State, Statechart};
 use crate::time::Time;
 use rustc_hash::FxHashMap;
 
@@ -30,12 +30,12 @@ pub fn compile(model: &Statechart) -> (Option<Chart>, Findings) {
         return (None, builder.findings);
     }
     let mut chart = builder.tables(model.is_pure());
-    checks::connector_circles(&chart, &mut builder.findings);
+    checks::connector_cycles(&chart, &mut builder.findings);
     if finding::has_errors(&builder.findings) {
         return (None, builder.findings);
     }
     chart.connector_edges =
-        chart.nodes.iter().filter(|node| node.kind == Kind::Connector).map(|node| node.out.len).sum();
+        chart.nodes.iter().filter(|node| node.kind == NodeKind::Connector).map(|node| node.out.len).sum();
     chart.wide = Wide::of(&chart);
     mark_settling(&mut chart);
     chart.reactions = ReactionTable::of(&chart);
@@ -45,7 +45,7 @@ pub fn compile(model: &Statechart) -> (Option<Chart>, Findings) {
 
 /// A resolved transition, not yet in its place.
 struct ChartEdge<'m> {
-    written: &'m Transition,
+    written: &'m ChartTransition,
     src: u32,
     tgt: u32,
     pn: f64,
@@ -57,12 +57,12 @@ struct ChartBuilder<'m> {
     names: Vec<Ident>,
     parents: Vec<u32>,
     depths: Vec<u32>,
-    kinds: Vec<Kind>,
+    kinds: Vec<NodeKind>,
     origins: Vec<Origin>,
     states: Vec<Option<&'m State>>,
     children: FxHashMap<(u32, Ident), u32>,
     /// All transitions with their scopes and numbers there, in rFSM's order: a scope's own before those of the states in it.
-    written: Vec<(u32, usize, &'m Transition)>,
+    written: Vec<(u32, usize, &'m ChartTransition)>,
     edges: Vec<ChartEdge<'m>>,
     events: Vec<EventName>,
     /// Where each was listed first.
@@ -78,7 +78,7 @@ const RESERVED_IN_ROOT: [&str; 6] = ["err", "warn", "info", "dbg", "getevents", 
 
 impl<'m> ChartBuilder<'m> {
     fn walk_root(&mut self, root: &'m State) {
-        let node = self.add(Ident::new(ROOT).expect("`root` is a name"), NONE, 0, Kind::Composite, root.origin);
+        let node = self.add(Ident::new(ROOT).expect("`root` is a name"), NONE, 0, NodeKind::Composite, root.origin);
         self.walk(root, node, 0);
         if !self.children.contains_key(&(node, initial())) {
             self.findings.push(
@@ -89,7 +89,7 @@ impl<'m> ChartBuilder<'m> {
                         "write a transition from `initial` to the first state: `trans { src = \"initial\", tgt = … }`",
                     ),
             );
-        } else if self.kinds[self.children[&(node, initial())] as usize] != Kind::Connector {
+        } else if self.kinds[self.children[&(node, initial())] as usize] != NodeKind::Connector {
             let at = self.children[&(node, initial())];
             self.findings.push(
                 Finding::error(codes::CHART_INITIAL_STATE, "`initial` of the root is a state, not a connector")
@@ -100,7 +100,7 @@ impl<'m> ChartBuilder<'m> {
         }
     }
 
-    fn add(&mut self, name: Ident, parent: u32, depth: u32, kind: Kind, origin: Origin) -> u32 {
+    fn add(&mut self, name: Ident, parent: u32, depth: u32, kind: NodeKind, origin: Origin) -> u32 {
         let node = u32::try_from(self.names.len()).expect("fewer nodes than ids");
         self.names.push(name);
         self.parents.push(parent);
@@ -130,7 +130,7 @@ impl<'m> ChartBuilder<'m> {
         self.written
             .extend(state.transitions.iter().enumerate().map(|(number, transition)| (node, number, transition)));
         let composite = !state.children.is_empty();
-        self.kinds[node as usize] = if composite { Kind::Composite } else { Kind::Leaf };
+        self.kinds[node as usize] = if composite { NodeKind::Composite } else { NodeKind::Leaf };
         for child in &state.children {
             let (name, origin) = (child.name(), child.origin());
             if let Some(first) = self.children.get(&(node, name)) {
@@ -144,11 +144,11 @@ impl<'m> ChartBuilder<'m> {
             }
             self.check_name(node, name, origin);
             match child {
-                Node::Connector(_) => {
-                    self.add(name, node, depth + 1, Kind::Connector, origin);
+                ChartNode::Connector(_) => {
+                    self.add(name, node, depth + 1, NodeKind::Connector, origin);
                 }
-                Node::State(inner) => {
-                    let id = self.add(name, node, depth + 1, Kind::Leaf, origin);
+                ChartNode::State(inner) => {
+                    let id = self.add(name, node, depth + 1, NodeKind::Leaf, origin);
                     self.walk(inner, id, depth + 1);
                 }
             }
@@ -162,7 +162,7 @@ impl<'m> ChartBuilder<'m> {
             && !self.children.contains_key(&(node, initial()))
         {
             let origin = transition.src.as_ref().map_or(transition.origin, |(_, origin)| *origin);
-            self.add(initial(), node, depth + 1, Kind::Connector, origin);
+            self.add(initial(), node, depth + 1, NodeKind::Connector, origin);
         }
     }
 
@@ -224,7 +224,7 @@ impl<'m> ChartBuilder<'m> {
     fn end(
         &mut self,
         scope: u32,
-        transition: &Transition,
+        transition: &ChartTransition,
         end: &Option<(String, Origin)>,
         which: &str,
         path: &str,
@@ -270,7 +270,7 @@ impl<'m> ChartBuilder<'m> {
         }
     }
 
-    fn edge(&mut self, transition: &'m Transition, src: u32, mut tgt: u32, path: &str) {
+    fn edge(&mut self, transition: &'m ChartTransition, src: u32, mut tgt: u32, path: &str) {
         if src == 0 {
             self.findings.push(
                 Finding::error(
@@ -283,7 +283,7 @@ impl<'m> ChartBuilder<'m> {
             );
             return;
         }
-        if self.kinds[tgt as usize] == Kind::Composite {
+        if self.kinds[tgt as usize] == NodeKind::Composite {
             let Some(initial) = self.children.get(&(tgt, initial())).copied() else {
                 let target = self.fqn(tgt);
                 let origin = transition.tgt.as_ref().map_or(transition.origin, |(_, origin)| *origin);
@@ -302,7 +302,7 @@ impl<'m> ChartBuilder<'m> {
                 return;
             };
             tgt = initial;
-            if self.kinds[tgt as usize] != Kind::Connector {
+            if self.kinds[tgt as usize] != NodeKind::Connector {
                 self.findings.push(
                     Finding::warning(
                         codes::CHART_INITIAL_STATE,
@@ -325,7 +325,7 @@ fn mark_settling(chart: &mut Chart) {
     }
     let mut machine = Machine::new(chart);
     for leaf in chart.nodes() {
-        if chart.kind(leaf) != Kind::Leaf {
+        if chart.kind(leaf) != NodeKind::Leaf {
             continue;
         }
         machine.place(chart, leaf, Time::default());

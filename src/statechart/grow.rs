@@ -4,13 +4,13 @@
 //! or transition stands at the end of its table. The outgoing transitions of a node stand side by side, so with a new one
 //! all of them move to the end; the rows they leave are read by nobody who begins to look after that.
 
-use super::chart::{ActionOp, Chart, EdgeId, EdgeRow, EventId, Kind, NONE, NodeId, NodeRow, Span};
+use super::chart::{ActionOp, Chart, EdgeId, EdgeRow, EventId, NONE, NodeId, NodeKind, NodeRow, Span};
 use super::reactions::ReactionTable;
 use super::wide::Wide;
 use crate::limits;
 use crate::model::finding::Origin;
 use crate::model::names::{EventName, Ident};
-use crate::model::statechart::{Action, FunctionId, Node, State, Transition, Trigger};
+use crate::model::statechart::{Action, ChartNode, ChartTransition, FunctionId, State, Trigger};
 
 /// Why something cannot be added to a chart.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -67,11 +67,11 @@ impl Chart {
     ///
     /// # Errors
     /// [`NotGrown`]; the chart is as before.
-    pub fn add_node(&mut self, parent: NodeId, node: Addition<'_, Node>) -> Result<NodeId, NotGrown> {
+    pub fn add_node(&mut self, parent: NodeId, node: Addition<'_, ChartNode>) -> Result<NodeId, NotGrown> {
         let around = &self.nodes[parent.index()];
         let depth = around.depth + 1;
         let name = node.what.name();
-        if around.kind == Kind::Connector {
+        if around.kind == NodeKind::Connector {
             return Err(NotGrown::InConnector(self.fqn(parent).to_string()));
         }
         if around.doo.is_some() {
@@ -84,14 +84,14 @@ impl Chart {
             return Err(NotGrown::Full);
         }
         let state = match node.what {
-            Node::State(state) if !state.children.is_empty() || !state.transitions.is_empty() => {
+            ChartNode::State(state) if !state.children.is_empty() || !state.transitions.is_empty() => {
                 return Err(NotGrown::Composite(name));
             }
-            Node::State(state) => Some(Addition { what: state, functions: node.functions }),
-            Node::Connector(_) => None,
+            ChartNode::State(state) => Some(Addition { what: state, functions: node.functions }),
+            ChartNode::Connector(_) => None,
         };
         let id = length(&self.nodes);
-        let kind = if state.is_some() { Kind::Leaf } else { Kind::Connector };
+        let kind = if state.is_some() { NodeKind::Leaf } else { NodeKind::Connector };
         let out = Span { start: length(&self.edges), len: 0 };
         let (entry, exit) = state.map_or_else(Default::default, |state| self.add_entry_and_exit(state));
         let doo = state.and_then(|state| Some(state.function(state.what.doo?.0)));
@@ -128,7 +128,7 @@ impl Chart {
     pub fn add_edge(
         &mut self,
         (src, tgt): (NodeId, NodeId),
-        transition: Addition<'_, Transition>,
+        transition: Addition<'_, ChartTransition>,
         event: &mut dyn FnMut(&mut Self, EventName) -> EventId,
     ) -> Result<Vec<(EdgeId, Option<EdgeId>)>, NotGrown> {
         if src == NodeId::ROOT || tgt == NodeId::ROOT {
@@ -190,7 +190,7 @@ impl Chart {
         self.edge_origins.push(Origin::NONE);
         self.priorities.push(what.pn);
         self.nodes[src.index()].out = Span { start, len: before.len + 1 };
-        if self.nodes[src.index()].kind == Kind::Connector {
+        if self.nodes[src.index()].kind == NodeKind::Connector {
             self.connector_edges += 1;
         }
         places.push((EdgeId(edge), None));
@@ -207,7 +207,8 @@ impl Chart {
         self.events.push(name);
         self.event_ids.insert(name, id);
         if let Some(path) = name.as_str().strip_prefix("e_done@") {
-            let leaf = self.nodes().find(|node| self.kind(*node) == Kind::Leaf && self.fqn(*node).to_string() == path);
+            let leaf =
+                self.nodes().find(|node| self.kind(*node) == NodeKind::Leaf && self.fqn(*node).to_string() == path);
             if let Some(leaf) = leaf {
                 self.nodes[leaf.index()].done = id;
             }

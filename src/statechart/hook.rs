@@ -34,7 +34,7 @@ pub enum ActionPlace {
 }
 
 /// What a function may see and do.
-pub struct View<'a> {
+pub struct HookContext<'a> {
     /// The chart.
     pub chart: &'a Chart,
     /// The active leaf; while a transition is under way as rFSM tells it: on exit still the old one, on entry none.
@@ -63,14 +63,14 @@ pub enum Doo {
 ///
 /// Functions report their own errors; an error never aborts a transition.
 pub trait Hook {
-    /// Whether the hook has its hand in single turns: it implements [`poll`](Self::poll), [`before_step`](Self::before_step),
+    /// Whether the hook has its hand in single microsteps: it implements [`poll`](Self::poll), [`before_step`](Self::before_step),
     /// [`after_step`](Self::after_step) or [`go_on`](Self::go_on). If not, [`Machine::run`](super::Machine::run) leaves out
-    /// turns of which it is known that they do nothing (a completion that triggers nothing, and the idle turn after it).
-    const TURNS: bool = true;
+    /// microsteps of which it is known that they do nothing (a completion that triggers nothing, and the idle microstep after it).
+    const MICROSTEPS: bool = true;
 
     /// Whether the hook wants to hear of more than names raised: it implements [`entered`](Self::entered),
     /// [`exited`](Self::exited), [`taking`](Self::taking) or [`conflict`](Self::conflict). If not (and if it has no hand in
-    /// single turns), whole reactions that are known beforehand are taken at once.
+    /// single microsteps), whole reactions that are known beforehand are taken at once.
     const WATCHES: bool = true;
 
     /// Whether a watcher wants what functions print between the things it watches, in [`heard`](Self::heard).
@@ -87,19 +87,19 @@ pub trait Hook {
     }
 
     /// The seconds of a time event whose time a function says; asked on every entry of `state`. None: it never comes.
-    fn seconds(&mut self, function: FunctionId, state: NodeId, view: &mut View<'_>) -> Option<f64> {
+    fn seconds(&mut self, function: FunctionId, state: NodeId, view: &mut HookContext<'_>) -> Option<f64> {
         let _ = (function, state, view);
         None
     }
 
     /// Moves what functions said since the last time to the end of `said`.
-    fn said(&mut self, said: &mut Vec<Said>) {
+    fn said(&mut self, said: &mut Vec<FunctionOutput>) {
         let _ = said;
     }
 
     /// What functions have said up to here, for who watches and wants it in order with what happens
     /// ([`HEARS`](Self::HEARS)). Drained.
-    fn heard(&mut self, said: &mut Vec<Said>) {
+    fn heard(&mut self, said: &mut Vec<FunctionOutput>) {
         said.clear();
     }
 
@@ -108,7 +108,7 @@ pub trait Hook {
         0
     }
 
-    /// Whether turns are to be taken now and then even when no event waits: the model asks outside for events.
+    /// Whether microsteps are to be taken now and then even when no event waits: the model asks outside for events.
     fn polls(&self) -> bool {
         false
     }
@@ -119,7 +119,7 @@ pub trait Hook {
     }
 
     /// What happens, told to a model's own `dbg` printer.
-    fn trace(&mut self, what: Trace<'_>, view: &mut View<'_>) {
+    fn trace(&mut self, what: Trace<'_>, view: &mut HookContext<'_>) {
         let _ = (what, view);
     }
 
@@ -153,38 +153,38 @@ pub trait Hook {
         let _ = chart;
     }
 
-    /// Adds the events that wait outside (rFSM's `getevents`). `false`: it failed, and the turn ends there.
+    /// Adds the events that wait outside (rFSM's `getevents`). `false`: it failed, and the microstep ends there.
     fn poll(&mut self, queue: &mut Queue) -> bool {
         let _ = queue;
         true
     }
 
     /// Before a step. `events` are those of the step; what the hook leaves in there the step uses. `false`: it failed, and
-    /// the turn ends there.
-    fn before_step(&mut self, view: &mut View<'_>, events: &mut Vec<EventId>) -> bool {
+    /// the microstep ends there.
+    fn before_step(&mut self, view: &mut HookContext<'_>, events: &mut Vec<EventId>) -> bool {
         let _ = (view, events);
         true
     }
 
     /// After a step.
-    fn after_step(&mut self, view: &mut View<'_>) {
+    fn after_step(&mut self, view: &mut HookContext<'_>) {
         let _ = view;
     }
 
     /// Whether a guard lets the transition pass. What a script answers with nothing at all counts as yes.
-    fn guard(&mut self, function: FunctionId, edge: EdgeId, view: &mut View<'_>) -> bool {
+    fn guard(&mut self, function: FunctionId, edge: EdgeId, view: &mut HookContext<'_>) -> bool {
         let _ = (function, edge, view);
         false
     }
 
     /// Whether a predicate accepts an event.
-    fn predicate(&mut self, function: FunctionId, event: EventId, view: &mut View<'_>) -> bool {
+    fn predicate(&mut self, function: FunctionId, event: EventId, view: &mut HookContext<'_>) -> bool {
         let _ = (function, event, view);
         false
     }
 
     /// Runs an entry, exit or effect function.
-    fn action(&mut self, function: FunctionId, place: ActionPlace, view: &mut View<'_>) {
+    fn action(&mut self, function: FunctionId, place: ActionPlace, view: &mut HookContext<'_>) {
         let _ = (function, place, view);
     }
 
@@ -194,7 +194,7 @@ pub trait Hook {
     }
 
     /// Resumes the activity of `state`.
-    fn doo(&mut self, function: FunctionId, state: NodeId, view: &mut View<'_>) -> Doo {
+    fn doo(&mut self, function: FunctionId, state: NodeId, view: &mut HookContext<'_>) -> Doo {
         let _ = (function, state, view);
         Doo::Failed
     }
@@ -209,14 +209,14 @@ pub trait Hook {
         let _ = (chart, from);
     }
 
-    /// After a turn: the chart from now on, if the model has added to it. `chart` is the one of this turn, whose numbers
+    /// After a microstep: the chart from now on, if the model has added to it. `chart` is the one of this microstep, whose numbers
     /// stay; events in `queue` that have got a number by it are exchanged.
     fn grown(&mut self, chart: &Chart, queue: &mut Queue) -> Option<Arc<Chart>> {
         let _ = (chart, queue);
         None
     }
 
-    /// A chain of connectors went round in a circle, held by nothing; no transition is taken in this step.
+    /// A chain of connectors went round in a cycle, held by nothing; no transition is taken in this step.
     fn runaway(&mut self, chart: &Chart, connector: NodeId) {
         let _ = (chart, connector);
     }
@@ -224,7 +224,7 @@ pub trait Hook {
 
 /// What a function of a model prints, or what it did wrong.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Said {
+pub struct FunctionOutput {
     /// By which of the four printers.
     pub by: Printer,
     /// One line or more.
@@ -265,7 +265,7 @@ impl<W: Hook, F: Hook> Watched<'_, W, F> {
 }
 
 impl<W: Hook, F: Hook> Hook for Watched<'_, W, F> {
-    const TURNS: bool = W::TURNS || F::TURNS;
+    const MICROSTEPS: bool = W::MICROSTEPS || F::MICROSTEPS;
     const WATCHES: bool = W::WATCHES || F::WATCHES;
 
     fn event(&mut self, chart: &Chart, name: EventName) -> EventId {
@@ -276,11 +276,11 @@ impl<W: Hook, F: Hook> Hook for Watched<'_, W, F> {
         self.functions.event_text(chart, event)
     }
 
-    fn seconds(&mut self, function: FunctionId, state: NodeId, view: &mut View<'_>) -> Option<f64> {
+    fn seconds(&mut self, function: FunctionId, state: NodeId, view: &mut HookContext<'_>) -> Option<f64> {
         self.functions.seconds(function, state, view)
     }
 
-    fn said(&mut self, said: &mut Vec<Said>) {
+    fn said(&mut self, said: &mut Vec<FunctionOutput>) {
         self.functions.said(said);
     }
 
@@ -296,7 +296,7 @@ impl<W: Hook, F: Hook> Hook for Watched<'_, W, F> {
         self.functions.traces()
     }
 
-    fn trace(&mut self, what: Trace<'_>, view: &mut View<'_>) {
+    fn trace(&mut self, what: Trace<'_>, view: &mut HookContext<'_>) {
         self.functions.trace(what, view);
     }
 
@@ -339,23 +339,23 @@ impl<W: Hook, F: Hook> Hook for Watched<'_, W, F> {
         self.functions.poll(queue)
     }
 
-    fn before_step(&mut self, view: &mut View<'_>, events: &mut Vec<EventId>) -> bool {
+    fn before_step(&mut self, view: &mut HookContext<'_>, events: &mut Vec<EventId>) -> bool {
         self.functions.before_step(view, events)
     }
 
-    fn after_step(&mut self, view: &mut View<'_>) {
+    fn after_step(&mut self, view: &mut HookContext<'_>) {
         self.functions.after_step(view);
     }
 
-    fn guard(&mut self, function: FunctionId, edge: EdgeId, view: &mut View<'_>) -> bool {
+    fn guard(&mut self, function: FunctionId, edge: EdgeId, view: &mut HookContext<'_>) -> bool {
         self.functions.guard(function, edge, view)
     }
 
-    fn predicate(&mut self, function: FunctionId, event: EventId, view: &mut View<'_>) -> bool {
+    fn predicate(&mut self, function: FunctionId, event: EventId, view: &mut HookContext<'_>) -> bool {
         self.functions.predicate(function, event, view)
     }
 
-    fn action(&mut self, function: FunctionId, place: ActionPlace, view: &mut View<'_>) {
+    fn action(&mut self, function: FunctionId, place: ActionPlace, view: &mut HookContext<'_>) {
         self.functions.action(function, place, view);
     }
 
@@ -363,7 +363,7 @@ impl<W: Hook, F: Hook> Hook for Watched<'_, W, F> {
         self.functions.doo_reset(state);
     }
 
-    fn doo(&mut self, function: FunctionId, state: NodeId, view: &mut View<'_>) -> Doo {
+    fn doo(&mut self, function: FunctionId, state: NodeId, view: &mut HookContext<'_>) -> Doo {
         self.functions.doo(function, state, view)
     }
 
@@ -390,6 +390,6 @@ impl<W: Hook, F: Hook> Hook for Watched<'_, W, F> {
 pub struct Nobody;
 
 impl Hook for Nobody {
-    const TURNS: bool = false;
+    const MICROSTEPS: bool = false;
     const WATCHES: bool = false;
 }

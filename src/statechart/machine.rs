@@ -1,9 +1,9 @@
 //! One run of a chart: rFSM's `step` and `run` (`docs/rfsm.md` §5, §6, §7, §9).
 
 use super::EdgeId;
-use super::chart::{ActionOp, Chart, EventId, Kind, NONE, NodeId, Span};
-use super::hook::{ActionPlace, Doo, Hook, Nobody, Raised, View};
-use super::outcome::{Mode, RunEnd, Stepped, TurnResult};
+use super::chart::{ActionOp, Chart, EventId, NONE, NodeId, NodeKind, Span};
+use super::hook::{ActionPlace, Doo, Hook, HookContext, Nobody, Raised};
+use super::outcome::{MicrostepResult, Mode, RunEnd, Stepped};
 use super::queue::Queue;
 use super::search::{Around, Search, Straight};
 use super::{timers::ArmedTimer, trace::Trace};
@@ -144,7 +144,7 @@ impl Machine {
     /// # Panics
     /// If `leaf` is no leaf.
     pub fn place(&mut self, chart: &Chart, leaf: NodeId, now: Time) {
-        assert_eq!(chart.kind(leaf), Kind::Leaf, "only a leaf can be the innermost active state");
+        assert_eq!(chart.kind(leaf), NodeKind::Leaf, "only a leaf can be the innermost active state");
         self.path.clear();
         self.queue.events.clear();
         let mut at = Some(leaf);
@@ -175,22 +175,22 @@ impl Machine {
         (0..self.path.len()).any(|i| self.find(chart, self.path[i].0, &mut Nobody) != NONE)
     }
 
-    /// What rFSM's `step(fsm, steps)` does: turns until `steps` of them counted, or nothing is left to do. A turn whose
+    /// What rFSM's `step(fsm, steps)` does: microsteps until `steps` of them counted, or nothing is left to do. A microstep whose
     /// events match no transition does not count.
     pub fn step(&mut self, chart: &Chart, now: Time, steps: u64, hook: &mut impl Hook) -> Stepped {
         let mut left = steps;
         let mut transition = false;
         for _ in 0..limits::CHART_RUN.saturating_add(steps) {
-            let turn = self.turn(chart, now, hook);
+            let microstep = self.microstep(chart, now, hook);
             let mut idle = false;
-            match turn {
-                TurnResult::NotEntered => return Stepped { idle: false, transition, ended: RunEnd::NotEntered },
-                TurnResult::Entered | TurnResult::Taken => {
+            match microstep {
+                MicrostepResult::NotEntered => return Stepped { idle: false, transition, ended: RunEnd::NotEntered },
+                MicrostepResult::Entered | MicrostepResult::Taken => {
                     transition = true;
                     left = left.saturating_sub(1);
                 }
-                TurnResult::Unmatched => (),
-                TurnResult::Quiet { idle: quiet } => {
+                MicrostepResult::Unmatched => (),
+                MicrostepResult::Quiet { idle: quiet } => {
                     idle = quiet;
                     left = left.saturating_sub(1);
                 }
@@ -205,36 +205,36 @@ impl Machine {
         Stepped { idle: false, transition, ended: RunEnd::Endless }
     }
 
-    /// What rFSM's `run(fsm)` does: turns until nothing is left to do, but no more than [`limits::CHART_RUN`].
+    /// What rFSM's `run(fsm)` does: microsteps until nothing is left to do, but no more than [`limits::CHART_RUN`].
     pub fn run<H: Hook>(&mut self, chart: &Chart, now: Time, hook: &mut H) -> Stepped {
         let mut transition = false;
         for _ in 0..limits::CHART_RUN {
-            match self.turn(chart, now, hook) {
-                TurnResult::NotEntered => return Stepped { idle: false, transition, ended: RunEnd::NotEntered },
-                TurnResult::Entered | TurnResult::Taken => {
+            match self.microstep(chart, now, hook) {
+                MicrostepResult::NotEntered => return Stepped { idle: false, transition, ended: RunEnd::NotEntered },
+                MicrostepResult::Entered | MicrostepResult::Taken => {
                     transition = true;
                     if self.rest::<H>(chart) {
                         return Stepped { idle: true, transition, ended: RunEnd::Idle };
                     }
                 }
-                TurnResult::Quiet { idle: true } if !hook.go_on() => {
+                MicrostepResult::Quiet { idle: true } if !hook.go_on() => {
                     return Stepped { idle: true, transition, ended: RunEnd::Idle };
                 }
-                TurnResult::Unmatched | TurnResult::Quiet { .. } => (),
+                MicrostepResult::Unmatched | MicrostepResult::Quiet { .. } => (),
             }
         }
         Stepped { idle: false, transition, ended: RunEnd::Endless }
     }
 
-    /// One turn of the step loop: all events that wait are one set; it is used for at most one transition and then gone.
-    pub fn turn<H: Hook>(&mut self, chart: &Chart, now: Time, hook: &mut H) -> TurnResult {
-        if !H::TURNS {
-            return self.turn_in(chart, now, hook);
+    /// One microstep of the step loop: all events that wait are one set; it is used for at most one transition and then gone.
+    pub fn microstep<H: Hook>(&mut self, chart: &Chart, now: Time, hook: &mut H) -> MicrostepResult {
+        if !H::MICROSTEPS {
+            return self.microstep_in(chart, now, hook);
         }
         let own = self.grown.clone();
         let chart = own.as_deref().unwrap_or(chart);
         self.fit(chart);
-        let step = self.turn_in(chart, now, hook);
+        let step = self.microstep_in(chart, now, hook);
         if let Some(grown) = hook.grown(chart, &mut self.queue) {
             self.fit(&grown);
             self.grown = Some(grown);
@@ -250,17 +250,17 @@ impl Machine {
         }
     }
 
-    fn turn_in<H: Hook>(&mut self, chart: &Chart, now: Time, hook: &mut H) -> TurnResult {
+    fn microstep_in<H: Hook>(&mut self, chart: &Chart, now: Time, hook: &mut H) -> MicrostepResult {
         if !hook.poll(&mut self.queue) {
-            return TurnResult::Unmatched;
+            return MicrostepResult::Unmatched;
         }
         self.events.clear();
         std::mem::swap(&mut self.queue.events, &mut self.events);
-        if H::TURNS {
+        if H::MICROSTEPS {
             let mut changed = std::mem::take(&mut self.changed);
             changed.clone_from(&self.events);
             if !hook.before_step(&mut self.view(chart), &mut changed) {
-                return TurnResult::Unmatched;
+                return MicrostepResult::Unmatched;
             }
             self.changed = std::mem::replace(&mut self.events, changed);
         }
@@ -272,17 +272,17 @@ impl Machine {
         } else {
             self.transit(chart, now, hook)
         };
-        if step != TurnResult::NotEntered {
+        if step != MicrostepResult::NotEntered {
             self.check_timers(chart, now, hook);
             hook.after_step(&mut self.view(chart));
         }
         step
     }
 
-    /// Whether the turns that are left do nothing; then they count as taken. All that waits is the completion of a leaf
+    /// Whether the microsteps that are left do nothing; then they count as taken. All that waits is the completion of a leaf
     /// without activity, of which compiling found that it triggers nothing, and time events were looked at already.
     pub fn rest<H: Hook>(&mut self, chart: &Chart) -> bool {
-        let Some(leaf) = self.leaf.filter(|_| !H::TURNS) else { return false };
+        let Some(leaf) = self.leaf.filter(|_| !H::MICROSTEPS) else { return false };
         let row = &chart.nodes[leaf.index()];
         let rests = row.settles && self.mode == Mode::Done && self.queue.events == [row.done];
         if rests {
@@ -291,8 +291,8 @@ impl Machine {
         rests
     }
 
-    pub(super) fn view<'a>(&'a mut self, chart: &'a Chart) -> View<'a> {
-        View { chart, leaf: self.leaf, events: &self.events, queue: &mut self.queue }
+    pub(super) fn view<'a>(&'a mut self, chart: &'a Chart) -> HookContext<'a> {
+        HookContext { chart, leaf: self.leaf, events: &self.events, queue: &mut self.queue }
     }
 
     fn find(&mut self, chart: &Chart, node: u32, hook: &mut impl Hook) -> u32 {
@@ -300,22 +300,22 @@ impl Machine {
         self.search.from(chart, node, &mut around, hook)
     }
 
-    fn enter_chart(&mut self, chart: &Chart, now: Time, hook: &mut impl Hook) -> TurnResult {
+    fn enter_chart(&mut self, chart: &Chart, now: Time, hook: &mut impl Hook) -> MicrostepResult {
         self.search.begin();
         let way = self.find(chart, chart.initial, hook);
         if way == NONE {
             hook.not_entered(chart);
-            return TurnResult::NotEntered;
+            return MicrostepResult::NotEntered;
         }
         self.enter(chart, NodeId::ROOT, now, hook);
         self.trace_path(chart, way, hook);
         self.report(chart, chart.initial, way, hook);
         self.execute(chart, way, now, hook);
-        TurnResult::Entered
+        MicrostepResult::Entered
     }
 
     /// The outermost active state with a complete path wins, whatever the priorities further in.
-    fn transit(&mut self, chart: &Chart, now: Time, hook: &mut impl Hook) -> TurnResult {
+    fn transit(&mut self, chart: &Chart, now: Time, hook: &mut impl Hook) -> MicrostepResult {
         self.search.begin();
         self.trace(chart, Trace::Searching, hook);
         for i in 0..self.path.len() {
@@ -333,7 +333,7 @@ impl Machine {
                         hook.taking(chart, EdgeId(edge));
                         let row = &chart.edges[edge as usize];
                         self.segment(chart, edge, NodeId(row.lca), now, hook);
-                        return TurnResult::Taken;
+                        return MicrostepResult::Taken;
                     }
                     Straight::Unclear => (),
                 }
@@ -342,14 +342,14 @@ impl Machine {
             if way != NONE {
                 self.trace_path(chart, way, hook);
                 self.execute(chart, way, now, hook);
-                return TurnResult::Taken;
+                return MicrostepResult::Taken;
             }
         }
         self.trace(chart, Trace::NotFound, hook);
-        TurnResult::Unmatched
+        MicrostepResult::Unmatched
     }
 
-    fn quiet(&mut self, chart: &Chart, hook: &mut impl Hook) -> TurnResult {
+    fn quiet(&mut self, chart: &Chart, hook: &mut impl Hook) -> MicrostepResult {
         let mut idle = true;
         if let Some(leaf) = self.leaf
             && self.mode == Mode::Active
@@ -369,7 +369,7 @@ impl Machine {
         if idle {
             idle = hook.poll(&mut self.queue) && self.queue.events.is_empty();
         }
-        TurnResult::Quiet { idle }
+        MicrostepResult::Quiet { idle }
     }
 
     /// Takes the path that begins with `way`, segment by segment, to a leaf.
@@ -414,14 +414,14 @@ impl Machine {
         }
         self.trace(chart, Trace::Entering(EdgeId(edge)), hook);
         let target = &chart.nodes[row.tgt as usize];
-        let into = if target.kind == Kind::Connector { target.parent } else { row.tgt };
+        let into = if target.kind == NodeKind::Connector { target.parent } else { row.tgt };
         let depth = chart.nodes[into as usize].depth as usize;
         if depth == keep {
             self.enter(chart, NodeId(into), now, hook);
         } else if depth > keep {
             self.enter_down_to(chart, into, now, hook);
         }
-        target.kind != Kind::Connector
+        target.kind != NodeKind::Connector
     }
 
     /// Who owns what the exits and effects of the path raise: the outermost of its least common ancestors, which stays
@@ -445,7 +445,7 @@ impl Machine {
         hook.exited(chart, state);
         let row = &chart.nodes[state.index()];
         self.act(chart, row.exit, ActionPlace::Exit(state), owner, hook);
-        if row.kind == Kind::Leaf {
+        if row.kind == NodeKind::Leaf {
             self.leaf = None;
         }
         self.trace(chart, Trace::Left(state), hook);
@@ -472,7 +472,7 @@ impl Machine {
         hook.entered(chart, state);
         let row = &chart.nodes[state.index()];
         self.act(chart, row.entry, ActionPlace::Entry(state), state, hook);
-        if row.kind == Kind::Leaf {
+        if row.kind == NodeKind::Leaf {
             self.leaf = Some(state);
             if row.doo.is_some() {
                 self.mode = Mode::Active;

@@ -26,13 +26,13 @@ mod timers;
 mod trace;
 mod wide;
 
-pub use chart::{Chart, EdgeId, EventId, FindError, Kind, NodeId, RaiseSite, When};
+pub use chart::{Chart, EdgeId, EventId, FindError, NodeId, NodeKind, RaiseMoment, RaiseSite};
 pub use compile::compile;
 pub use grow::{Addition, NotGrown};
-pub use hook::{ActionPlace, Doo, Hook, Nobody, Printer, Raised, Said, View, Watched};
+pub use hook::{ActionPlace, Doo, FunctionOutput, Hook, HookContext, Nobody, Printer, Raised, Watched};
 pub use machine::Machine;
 pub use order::sort as sort_by_priority;
-pub use outcome::{Mode, RunEnd, Stepped, TurnResult};
+pub use outcome::{MicrostepResult, Mode, RunEnd, Stepped};
 pub use queue::Queue;
 pub use reactions::AtOnce;
 pub use sim::{Observation, Sim, SimError};

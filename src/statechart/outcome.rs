@@ -10,9 +10,9 @@ pub enum Mode {
     Done,
 }
 
-/// What one turn of the step loop did.
+/// What one microstep of the step loop did.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum TurnResult {
+pub enum MicrostepResult {
     /// The chart was entered.
     Entered,
     /// The chart could not be entered; the events are lost.
@@ -48,6 +48,6 @@ pub enum RunEnd {
     Steps,
     /// The chart could not be entered.
     NotEntered,
-    /// It did not come to rest within [`CHART_RUN`](crate::limits::CHART_RUN) turns (rFSM would never return).
+    /// It did not come to rest within [`CHART_RUN`](crate::limits::CHART_RUN) microsteps (rFSM would never return).
     Endless,
 }

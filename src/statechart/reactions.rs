@@ -7,10 +7,10 @@
 //! completion triggers something, and what is past [`limits::CHART_REACTIONS`].
 
 use super::EdgeId;
-use super::chart::{Chart, EventId, Kind, NodeId, Span};
+use super::chart::{Chart, EventId, NodeId, NodeKind, Span};
 use super::hook::{Hook, Nobody, Raised};
 use super::machine::Machine;
-use super::outcome::{Mode, TurnResult};
+use super::outcome::{MicrostepResult, Mode};
 use crate::limits;
 use crate::model::names::EventName;
 use crate::time::Time;
@@ -79,17 +79,17 @@ pub enum AtOnce {
     No,
     /// The transition was taken, and the machine is at rest.
     Rests,
-    /// The transition was taken; a time event that is due waits inside for the next turn.
+    /// The transition was taken; a time event that is due waits inside for the next microstep.
     Goes,
 }
 
 impl Machine {
     /// Takes the whole reaction to one event at once, if it is known beforehand and the machine is at rest. What happens is
-    /// what [`send`](Self::send) and turns up to the next rest would do; only names raised are told to the hook, so a hook
+    /// what [`send`](Self::send) and microsteps up to the next rest would do; only names raised are told to the hook, so a hook
     /// that watches states or transitions ([`Hook::WATCHES`]) is never served so.
     #[inline]
     pub fn at_once<H: Hook>(&mut self, chart: &Chart, event: EventId, now: Time, hook: &mut H) -> AtOnce {
-        let Some(leaf) = self.leaf.filter(|_| !H::TURNS && !H::WATCHES) else { return AtOnce::No };
+        let Some(leaf) = self.leaf.filter(|_| !H::MICROSTEPS && !H::WATCHES) else { return AtOnce::No };
         if !self.queue.events.is_empty() {
             return AtOnce::No;
         }
@@ -178,7 +178,7 @@ impl ReactionTable {
         let mut events = Vec::new();
         let mut notes = Notes::default();
         let (mut firsts, mut cost) = (0, 0);
-        for leaf in chart.nodes().filter(|node| chart.kind(*node) == Kind::Leaf) {
+        for leaf in chart.nodes().filter(|node| chart.kind(*node) == NodeKind::Leaf) {
             events.clear();
             let mut at = Some(leaf);
             while let Some(node) = at {
@@ -203,8 +203,8 @@ impl ReactionTable {
                 machine.place(chart, leaf, Time::default());
                 notes.clear();
                 machine.send(*event);
-                let step = machine.turn(chart, Time::default(), &mut notes);
-                if step == TurnResult::Taken && notes.plain && machine.rest::<Notes>(chart) {
+                let step = machine.microstep(chart, Time::default(), &mut notes);
+                if step == MicrostepResult::Taken && notes.plain && machine.rest::<Notes>(chart) {
                     let row = reactions.row(chart, leaf, *event, &machine, &notes);
                     if let Some(row) = row
                         && first.is_some()
@@ -291,7 +291,7 @@ impl Notes {
 }
 
 impl Hook for Notes {
-    const TURNS: bool = false;
+    const MICROSTEPS: bool = false;
 
     fn entered(&mut self, _: &Chart, state: NodeId) {
         self.entered.push(state);

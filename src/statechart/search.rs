@@ -9,14 +9,14 @@
 //! and a net of connectors costs its number of transitions, not its number of paths. With guards every visit counts,
 //! because guards may do things.
 //!
-//! Connectors may lead round in a circle that only several events together open, or that guards hold. When all of it is open,
+//! Connectors may lead round in a cycle that only several events together open, or that guards hold. When all of it is open,
 //! rFSM overflows its stack, which ends the step with an error. Here the search is lost: it finds no path, none further in
-//! either, and that is told ([`Hook::runaway`]). Without guards a circle is known when a connector is met again on the way to
+//! either, and that is told ([`Hook::runaway`]). Without guards a cycle is known when a connector is met again on the way to
 //! it; with guards only after [`limits::CONNECTOR_CHAIN`] connectors, since a guard may say something else each time.
 
 use super::EdgeId;
-use super::chart::{Chart, EdgeRow, EventId, Kind, NONE, NodeId};
-use super::hook::{Hook, View};
+use super::chart::{Chart, EdgeRow, EventId, NONE, NodeId, NodeKind};
+use super::hook::{Hook, HookContext};
 use super::queue::Queue;
 use super::wide::candidates;
 use crate::limits;
@@ -54,8 +54,8 @@ pub(super) struct Around<'a> {
 }
 
 impl Around<'_> {
-    fn view<'v>(&'v mut self, chart: &'v Chart) -> View<'v> {
-        View { chart, leaf: self.leaf, events: self.events, queue: self.queue }
+    fn view<'v>(&'v mut self, chart: &'v Chart) -> HookContext<'v> {
+        HookContext { chart, leaf: self.leaf, events: self.events, queue: self.queue }
     }
 }
 
@@ -81,9 +81,9 @@ impl Search {
             let listed = row.events.of(&chart.triggers);
             if row.null || events.iter().any(|event| lists(listed, *event)) {
                 match chart.nodes[row.tgt as usize].kind {
-                    Kind::Leaf => return Straight::Leaf(edge),
-                    Kind::Connector => return Straight::Unclear,
-                    Kind::Composite => return Straight::Unclear,
+                    NodeKind::Leaf => return Straight::Leaf(edge),
+                    NodeKind::Connector => return Straight::Unclear,
+                    NodeKind::Composite => return Straight::Unclear,
                 }
             }
         }
@@ -129,7 +129,7 @@ impl Search {
 
     fn find(&mut self, chart: &Chart, node: u32, around: &mut Around<'_>, hook: &mut impl Hook, chain: usize) -> u32 {
         let row = &chart.nodes[node as usize];
-        let is_connector = row.kind == Kind::Connector;
+        let is_connector = row.kind == NodeKind::Connector;
         if is_connector && chart.unguarded {
             let (step, found) = self.memo[node as usize];
             if step == self.step && found != OPEN {
@@ -151,13 +151,13 @@ impl Search {
                 continue;
             }
             let then = match chart.nodes[edge_row.tgt as usize].kind {
-                Kind::Leaf => NONE,
-                Kind::Connector => match self.find(chart, edge_row.tgt, around, hook, chain + 1) {
+                NodeKind::Leaf => NONE,
+                NodeKind::Connector => match self.find(chart, edge_row.tgt, around, hook, chain + 1) {
                     NONE if self.lost => return NONE,
                     NONE => continue,
                     then => then,
                 },
-                Kind::Composite => {
+                NodeKind::Composite => {
                     hook.no_way(chart, NodeId(node));
                     continue;
                 }

@@ -2,7 +2,7 @@
 
 use super::Machine;
 use super::chart::{Chart, NodeId};
-use super::hook::{Hook, Nobody, Printer, Raised, Said, Watched};
+use super::hook::{FunctionOutput, Hook, Nobody, Printer, Raised, Watched};
 use super::outcome::{Mode, RunEnd, Stepped};
 use super::{EdgeId, EventId};
 use crate::limits;
@@ -247,11 +247,11 @@ impl SimTrace {
 }
 
 impl Hook for SimTrace {
-    const TURNS: bool = false;
+    const MICROSTEPS: bool = false;
     const HEARS: bool = true;
 
-    fn heard(&mut self, said: &mut Vec<Said>) {
-        for Said { by, text } in said.drain(..) {
+    fn heard(&mut self, said: &mut Vec<FunctionOutput>) {
+        for FunctionOutput { by, text } in said.drain(..) {
             self.note(match by {
                 Printer::Err => format!("error: {text}"),
                 Printer::Warn => format!("warning: {text}"),

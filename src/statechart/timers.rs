@@ -1,4 +1,4 @@
-//! Time events of a run (`docs/rfsm.md` §9): begun on entry, looked at after every turn.
+//! Time events of a run (`docs/rfsm.md` §9): begun on entry, looked at after every microstep.
 
 use super::chart::{Chart, NodeId, TimerRow};
 use super::hook::Hook;
@@ -55,7 +55,7 @@ impl Machine {
         self.timers[index] = armed;
     }
 
-    /// After a turn: time events of the active states that are due, from the leaf outwards, each once a visit. What is
+    /// After a microstep: time events of the active states that are due, from the leaf outwards, each once a visit. What is
     /// raised here is seen in the next turn, even if this one was idle.
     pub(super) fn check_timers(&mut self, chart: &Chart, now: Time, hook: &mut impl Hook) {
         if chart.timers.is_empty() {

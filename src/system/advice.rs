@@ -1,6 +1,6 @@
 //! What a user reads of a violation: one text, whoever found it.
 
-use super::violation::Member;
+use super::violation::MemberClass;
 use super::{View, Violation};
 use crate::model::finding::did_you_mean;
 use crate::model::{ComponentName, ComponentType, Finding, MemberRef, Origin, Tunable, TypeName, ValueType};
@@ -133,7 +133,7 @@ impl Violation {
             }
             Self::PortUnmapped { port, with, out, ty } => {
                 let (from, to) = if *out { (port, with) } else { (with, port) };
-                let known: Vec<&str> = view.types().get(*ty).map(|ty| Member::Port.of(ty)).unwrap_or_default();
+                let known: Vec<&str> = view.types().get(*ty).map(|ty| MemberClass::Port.of(ty)).unwrap_or_default();
                 format!(
                     "say what it is called there, `map = {{ [\"{}\"] = \"…\" }}` ({}), or add `disconnect(\"{from}\", \"{to}\")`",
                     port.member,
@@ -149,12 +149,12 @@ impl Violation {
 }
 
 /// What may have been meant by a member that none of `types` has.
-fn near_member(what: Member, member: MemberRef, types: &[&ComponentType]) -> String {
+fn near_member(what: MemberClass, member: MemberRef, types: &[&ComponentType]) -> String {
     let name = member.member;
-    let others = Member::ALL.into_iter().filter(|other| *other != what);
+    let others = MemberClass::ALL.into_iter().filter(|other| *other != what);
     let elsewhere = others.flat_map(|other| types.iter().map(move |ty| (other, *ty)));
     if let Some((other, ty)) = elsewhere.into_iter().find(|(other, ty)| other.is_in(ty, name)) {
-        let article = if other == Member::Operation { "an" } else { "a" };
+        let article = if other == MemberClass::Operation { "an" } else { "a" };
         return format!("`{name}` is {article} {} of {}", other.words().0, ty.name);
     }
     let mut known: Vec<&str> = types.iter().flat_map(|ty| what.of(ty)).collect();

@@ -1,7 +1,7 @@
 //! The steps from one system to another. One mechanism for repair of drift, a return to a saved system, forced teardown
 //! and the comparison of two systems (semantics: *Steps and plans*).
 
-use super::{Node, Overlay, System, View, step};
+use super::{ComponentNode, Overlay, System, View, step};
 use crate::model::{ComponentName, MemberRef, Policy, RunState, Step, Value, Wanted};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -47,8 +47,9 @@ impl Diff {
 
     fn compare(&mut self, from: &System, to: &System) {
         let order = data_flow(from);
-        let kept =
-            |node: &Node| to.component(node.name).filter(|t| t.ty.name == node.ty.name && t.activity == node.activity);
+        let kept = |node: &ComponentNode| {
+            to.component(node.name).filter(|t| t.ty.name == node.ty.name && t.activity == node.activity)
+        };
         // Down: what goes away, and what holds a property that cannot be set in its present state.
         for node in &order {
             match kept(node) {
@@ -98,7 +99,7 @@ impl Diff {
     }
 
     /// Brings a component that stays down to where it can be changed, and keeps its property_sets for later.
-    fn lower(&mut self, node: &Node, target: &Node) {
+    fn lower(&mut self, node: &ComponentNode, target: &ComponentNode) {
         let (mut state, mut goal) = (node.state, None);
         let mut to_go = |wanted: Wanted| {
             goal = Some(wanted);
@@ -124,7 +125,12 @@ impl Diff {
         }
     }
 
-    fn disconnect<'t>(&mut self, from: &System, to: &'t System, kept: &impl Fn(&Node) -> Option<&'t Node>) {
+    fn disconnect<'t>(
+        &mut self,
+        from: &System,
+        to: &'t System,
+        kept: &impl Fn(&ComponentNode) -> Option<&'t ComponentNode>,
+    ) {
         let stays = |port: MemberRef| from.component(port.component).is_some_and(|n| kept(n).is_some());
         // In-ports whose recorded value changes: written with nothing connected.
         let mut rewritten = BTreeSet::new();
@@ -161,7 +167,7 @@ impl Diff {
     }
 }
 
-fn changed_ports(node: &Node, target: &Node) -> Vec<(MemberRef, Option<Value>)> {
+fn changed_ports(node: &ComponentNode, target: &ComponentNode) -> Vec<(MemberRef, Option<Value>)> {
     let ports = node.ty.ports.keys().enumerate();
     ports
         .filter(|(i, _)| node.written(*i) != target.written(*i))
@@ -170,8 +176,8 @@ fn changed_ports(node: &Node, target: &Node) -> Vec<(MemberRef, Option<Value>)> 
 }
 
 /// Components, producers before consumers; inside a loop by name.
-fn data_flow(system: &System) -> Vec<&Node> {
-    let mut components: Vec<Vec<&Node>> = petgraph::algo::kosaraju_scc(system.graph())
+fn data_flow(system: &System) -> Vec<&ComponentNode> {
+    let mut components: Vec<Vec<&ComponentNode>> = petgraph::algo::kosaraju_scc(system.graph())
         .into_iter()
         .map(|scc| scc.into_iter().map(|i| &system.graph()[i]).collect())
         .collect();

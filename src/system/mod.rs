@@ -16,15 +16,15 @@ pub mod touch;
 mod violation;
 
 pub use diff::{diff, moves_any};
-pub use node::{Driven, Link, Node, Written};
+pub use node::{ComponentNode, Driven, Link, Written};
 pub use overlay::Overlay;
 pub use picture::Picture;
-pub use place::Place;
+pub use place::SlotHandle;
 pub use so::is_so;
 pub use step::{Reversibility, Undo};
 pub use system_graph::{System, UnknownType};
 pub use touch::{Access, Slot, Touch};
-pub use violation::{Member, Violation, either};
+pub use violation::{MemberClass, Violation, either};
 
 use crate::model::{Catalogue, ComponentName, MemberRef, Policy, RunState, Value};
 
@@ -33,13 +33,13 @@ pub trait View {
     /// The component types known.
     fn types(&self) -> &Catalogue;
     /// The component of that name.
-    fn component(&self, name: ComponentName) -> Option<&Node>;
+    fn component(&self, name: ComponentName) -> Option<&ComponentNode>;
     /// The policy of the connection between two ports, if there is one.
     fn link(&self, from: MemberRef, to: MemberRef) -> Option<Policy>;
     /// What drives an in-port.
     fn driven(&self, port: MemberRef) -> Driven;
     /// Calls `f` with every component, in an order that is the same every run.
-    fn for_each_component(&self, f: &mut dyn FnMut(&Node));
+    fn for_each_component(&self, f: &mut dyn FnMut(&ComponentNode));
     /// Calls `f` with every connection, in an order that is the same every run.
     fn for_each_link(&self, f: &mut dyn FnMut(MemberRef, MemberRef, Policy));
 }
@@ -47,7 +47,7 @@ pub trait View {
 /// Writing a system. Only for the effects in [`step`]: nothing here checks anything.
 pub trait ViewMut: View {
     /// Adds a component; its name is free.
-    fn insert_component(&mut self, node: Node);
+    fn insert_component(&mut self, node: ComponentNode);
     /// Removes a component; it exists and has no connections.
     fn remove_component(&mut self, name: ComponentName);
     /// Adds a connection; both components exist.

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 /// A component.
 #[derive(Debug, Clone)]
-pub struct Node {
+pub struct ComponentNode {
     /// Its name.
     pub name: ComponentName,
     /// Its type.
@@ -71,7 +71,7 @@ pub struct Driven {
     pub data: u32,
 }
 
-impl Node {
+impl ComponentNode {
     pub(super) fn new(
         name: ComponentName,
         ty: Arc<ComponentType>,

@@ -1,7 +1,7 @@
 //! Changes laid over a system that stays as it is: what planning simulates on. Costs memory and time for what was
 //! touched, nothing for the rest.
 
-use super::node::{Driven, Node};
+use super::node::{ComponentNode, Driven};
 use super::system_graph::snapshot_of;
 use super::{System, View, ViewMut};
 use crate::model::{Catalogue, ComponentName, MemberRef, Policy, RunState, Snapshot, Value};
@@ -13,7 +13,7 @@ pub struct Overlay<'a> {
     base: &'a System,
     /// Touched components: their place in `arena`, or none when removed.
     nodes: FxHashMap<ComponentName, Option<u32>>,
-    arena: Vec<Node>,
+    arena: Vec<ComponentNode>,
     /// Connections that differ from the base (none: removed); `link_order` has every key once, in order of first touch.
     links: FxHashMap<(MemberRef, MemberRef), Option<Policy>>,
     link_order: Vec<(MemberRef, MemberRef)>,
@@ -62,7 +62,7 @@ impl<'a> Overlay<'a> {
             && other.link_order.iter().all(link)
     }
 
-    fn touch(&mut self, name: ComponentName) -> &mut Node {
+    fn touch(&mut self, name: ComponentName) -> &mut ComponentNode {
         let at = match self.nodes.get(&name) {
             Some(Some(at)) => *at,
             _ => {
@@ -75,7 +75,7 @@ impl<'a> Overlay<'a> {
         node
     }
 
-    fn place(&mut self, node: Node) -> u32 {
+    fn place(&mut self, node: ComponentNode) -> u32 {
         let at = u32::try_from(self.arena.len()).expect("fewer components than that");
         self.nodes.insert(node.name, Some(at));
         self.arena.push(node);
@@ -99,7 +99,7 @@ impl View for Overlay<'_> {
         self.base.types()
     }
 
-    fn component(&self, name: ComponentName) -> Option<&Node> {
+    fn component(&self, name: ComponentName) -> Option<&ComponentNode> {
         match self.nodes.get(&name) {
             Some(at) => at.map(|at| &self.arena[at as usize]),
             None => self.base.component(name),
@@ -117,7 +117,7 @@ impl View for Overlay<'_> {
         self.driven.get(&port).copied().unwrap_or_else(|| self.base.driven(port))
     }
 
-    fn for_each_component(&self, f: &mut dyn FnMut(&Node)) {
+    fn for_each_component(&self, f: &mut dyn FnMut(&ComponentNode)) {
         self.base.for_each_component(&mut |node| {
             if !self.nodes.contains_key(&node.name) {
                 f(node);
@@ -146,7 +146,7 @@ impl View for Overlay<'_> {
 }
 
 impl ViewMut for Overlay<'_> {
-    fn insert_component(&mut self, node: Node) {
+    fn insert_component(&mut self, node: ComponentNode) {
         self.place(node);
     }
 

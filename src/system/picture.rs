@@ -1,7 +1,7 @@
 //! A few components by themselves: what is judged by their types is judged on this, without a graph around it.
 
 use super::View;
-use super::node::{Driven, Node};
+use super::node::{ComponentNode, Driven};
 use crate::model::{Catalogue, ComponentName, ComponentType, MemberRef, Policy};
 use smallvec::SmallVec;
 use std::sync::Arc;
@@ -10,7 +10,7 @@ use std::sync::Arc;
 #[derive(Debug, Clone)]
 pub struct Picture<'t> {
     types: &'t Catalogue,
-    nodes: SmallVec<[Node; 2]>,
+    nodes: SmallVec<[ComponentNode; 2]>,
 }
 
 impl<'t> Picture<'t> {
@@ -21,7 +21,7 @@ impl<'t> Picture<'t> {
 
     /// Adds a component; its name is free.
     pub fn add(&mut self, name: ComponentName, ty: Arc<ComponentType>) {
-        self.nodes.push(Node::new(name, ty, None, Vec::new()));
+        self.nodes.push(ComponentNode::new(name, ty, None, Vec::new()));
     }
 }
 
@@ -30,7 +30,7 @@ impl View for Picture<'_> {
         self.types
     }
 
-    fn component(&self, name: ComponentName) -> Option<&Node> {
+    fn component(&self, name: ComponentName) -> Option<&ComponentNode> {
         self.nodes.iter().find(|node| node.name == name)
     }
 
@@ -42,7 +42,7 @@ impl View for Picture<'_> {
         Driven::default()
     }
 
-    fn for_each_component(&self, f: &mut dyn FnMut(&Node)) {
+    fn for_each_component(&self, f: &mut dyn FnMut(&ComponentNode)) {
         self.nodes.iter().for_each(f);
     }
 

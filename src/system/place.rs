@@ -1,7 +1,7 @@
 //! Steps and slots resolved to handles: the same meaning as in [`step`](super::step), without a name being looked up.
 //!
 //! A handle is as good as the component behind it: whoever keeps one looks whether that is still the same
-//! ([`Node::born`](super::Node::born)).
+//! ([`Node::born`](super::ComponentNode::born)).
 
 use super::step::{move_allowed, sample_allowed, value_allowed};
 use super::{Slot, System, View, Violation};
@@ -10,14 +10,14 @@ use petgraph::stable_graph::NodeIndex;
 
 /// Where a slot is: its component's handle, and the place of the property or port in the type's order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Place {
+pub struct SlotHandle {
     /// The component.
     pub node: NodeIndex,
     /// The property or port of it; of a run state nothing.
     at: usize,
 }
 
-impl Place {
+impl SlotHandle {
     /// The place of a run state, a property or a port. None: it is not there, or a slot of another kind.
     pub fn of(slot: Slot, system: &System) -> Option<Self> {
         let node = system.index_of(slot.components().0)?;

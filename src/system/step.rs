@@ -5,7 +5,7 @@
 
 pub use super::touch::{absolute, components, touch_each, touches};
 use super::violation::brief;
-use super::{Driven, Member, Node, View, ViewMut, Violation};
+use super::{ComponentNode, Driven, MemberClass, View, ViewMut, Violation};
 use crate::model::{
     Call, ComponentName, Direction, Effect, Ident, MemberRef, Policy, PortType, PropertyType, RunState, Step,
     Transition, TypeName, Value, ValueType,
@@ -83,7 +83,7 @@ pub fn effect(step: &Step, view: &mut impl ViewMut) {
         Step::State { component, transition } => view.put_state(*component, transition.target()),
         Step::Create { component, ty, activity, properties } => {
             let ty = view.types().get(*ty).cloned().expect("the type of a create is known");
-            view.insert_component(Node::new(*component, ty, *activity, properties.clone()));
+            view.insert_component(ComponentNode::new(*component, ty, *activity, properties.clone()));
         }
         Step::Destroy { component } => view.remove_component(*component),
         Step::Connect { from, to, policy } => view.insert_link(*from, *to, *policy),
@@ -276,12 +276,12 @@ fn port_of<'v>(port: MemberRef, view: &'v impl View, found: &mut Vec<Violation>)
     };
     let declared = node.ty.ports.get(&port.member);
     if declared.is_none() {
-        found.push(lacks(Member::Port, port, node));
+        found.push(lacks(MemberClass::Port, port, node));
     }
     declared
 }
 
-fn lacks(what: Member, member: MemberRef, node: &Node) -> Violation {
+fn lacks(what: MemberClass, member: MemberRef, node: &ComponentNode) -> Violation {
     Violation::UnknownMember { what, member, types: vec![node.ty.name] }
 }
 
@@ -369,20 +369,20 @@ fn set_allowed(property: MemberRef, value: &Value, view: &impl View, found: &mut
         return;
     };
     let Some((_, declared)) = node.property(property.member) else {
-        found.push(lacks(Member::Property, property, node));
+        found.push(lacks(MemberClass::Property, property, node));
         return;
     };
     value_allowed(node, property, declared, value, found);
 }
 
-pub(super) fn move_allowed(node: &Node, transition: Transition, found: &mut Vec<Violation>) {
+pub(super) fn move_allowed(node: &ComponentNode, transition: Transition, found: &mut Vec<Violation>) {
     if !transition.allowed_in(node.state) {
         found.push(Violation::Transition { component: node.name, transition, state: node.state });
     }
 }
 
 pub(super) fn value_allowed(
-    node: &Node,
+    node: &ComponentNode,
     property: MemberRef,
     declared: &PropertyType,
     value: &Value,
@@ -438,7 +438,7 @@ fn call_allowed(call: &Call, view: &impl View, found: &mut Vec<Violation>) {
         return;
     };
     let Some(declared) = node.ty.operations.get::<Ident>(&operation.member) else {
-        found.push(lacks(Member::Operation, operation, node));
+        found.push(lacks(MemberClass::Operation, operation, node));
         return;
     };
     let (wanted, origin) = (|| declared.args.clone(), declared.origin);

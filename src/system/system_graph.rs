@@ -1,7 +1,7 @@
 //! The picture of a system: components as nodes and connections as edges of a directed graph, with indices that answer
 //! every question of a step's precondition without a search.
 
-use super::node::{Driven, Link, Node};
+use super::node::{ComponentNode, Driven, Link};
 use super::{View, ViewMut};
 use crate::model::{Catalogue, ComponentName, MemberRef, Policy, RunState, Snapshot, TypeName, Value};
 use petgraph::stable_graph::{EdgeIndex, NodeIndex, StableDiGraph};
@@ -22,7 +22,7 @@ pub struct System {
 /// What is there.
 #[derive(Debug, Clone, Default)]
 struct There {
-    graph: StableDiGraph<Node, Link>,
+    graph: StableDiGraph<ComponentNode, Link>,
     names: FxHashMap<ComponentName, NodeIndex>,
     links: FxHashMap<(MemberRef, MemberRef), EdgeIndex>,
     driven: FxHashMap<MemberRef, Driven>,
@@ -66,7 +66,7 @@ impl System {
                         .unwrap_or(Value::Bool(false))
                 })
                 .collect();
-            let mut node = Node::new(*name, ty, component.activity, properties);
+            let mut node = ComponentNode::new(*name, ty, component.activity, properties);
             node.state = component.state;
             system.insert_component(node);
         }
@@ -175,7 +175,7 @@ impl System {
             }
             let values = ty.properties.values().map(|declared| declared.default.clone().unwrap_or(Value::Bool(false)));
             let values = values.collect();
-            self.insert_component(Node::new(name, ty.clone(), component.activity, values));
+            self.insert_component(ComponentNode::new(name, ty.clone(), component.activity, values));
         }
         let mut changed = another;
         if self.component(name).is_some_and(|node| node.state != component.state) {
@@ -235,7 +235,7 @@ impl System {
     }
 
     /// The graph: components, and connections from the out-port's component to the in-port's.
-    pub fn graph(&self) -> &StableDiGraph<Node, Link> {
+    pub fn graph(&self) -> &StableDiGraph<ComponentNode, Link> {
         &self.there.graph
     }
 
@@ -254,7 +254,7 @@ impl System {
     }
 
     /// The component behind a handle.
-    pub fn node_at(&self, index: NodeIndex) -> Option<&Node> {
+    pub fn node_at(&self, index: NodeIndex) -> Option<&ComponentNode> {
         self.there.graph.node_weight(index)
     }
 
@@ -268,14 +268,14 @@ impl System {
         self.revision = other.revision;
     }
 
-    pub(super) fn touch_at(&mut self, index: NodeIndex) -> Option<&mut Node> {
+    pub(super) fn touch_at(&mut self, index: NodeIndex) -> Option<&mut ComponentNode> {
         self.revision += 1;
         let node = Arc::make_mut(&mut self.there).graph.node_weight_mut(index)?;
         node.generation = self.revision;
         Some(node)
     }
 
-    fn touch(&mut self, name: ComponentName) -> &mut Node {
+    fn touch(&mut self, name: ComponentName) -> &mut ComponentNode {
         self.touch_at(self.there.names[&name]).expect("names and nodes agree")
     }
 }
@@ -285,7 +285,7 @@ impl View for System {
         &self.types
     }
 
-    fn component(&self, name: ComponentName) -> Option<&Node> {
+    fn component(&self, name: ComponentName) -> Option<&ComponentNode> {
         self.there.names.get(&name).map(|i| &self.there.graph[*i])
     }
 
@@ -297,7 +297,7 @@ impl View for System {
         self.there.driven.get(&port).copied().unwrap_or_default()
     }
 
-    fn for_each_component(&self, f: &mut dyn FnMut(&Node)) {
+    fn for_each_component(&self, f: &mut dyn FnMut(&ComponentNode)) {
         self.there.graph.node_weights().for_each(f);
     }
 
@@ -311,7 +311,7 @@ impl View for System {
 }
 
 impl ViewMut for System {
-    fn insert_component(&mut self, mut node: Node) {
+    fn insert_component(&mut self, mut node: ComponentNode) {
         self.revision += 1;
         node.born = self.revision;
         node.generation = self.revision;

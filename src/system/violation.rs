@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 /// A kind of what components have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Member {
+pub enum MemberClass {
     /// A port.
     Port,
     /// A property.
@@ -18,7 +18,7 @@ pub enum Member {
     Operation,
 }
 
-impl Member {
+impl MemberClass {
     /// All of them.
     pub const ALL: [Self; 3] = [Self::Port, Self::Property, Self::Operation];
 
@@ -70,7 +70,7 @@ pub enum Violation {
     StillConnected { component: ComponentName, links: Vec<(MemberRef, MemberRef)> },
     /// `types` are all that the component may be of. The member alone is quoted: a finding points at what it quotes first.
     #[error("{} ({}) has no {} `{}`", member.component, either(types), what.words().0, member.member)]
-    UnknownMember { what: Member, member: MemberRef, types: Vec<TypeName> },
+    UnknownMember { what: MemberClass, member: MemberRef, types: Vec<TypeName> },
     #[error("`{port}` is an in-port; a connection begins at an out-port")]
     NotOut { port: MemberRef, declared: Origin },
     #[error("`{port}` is an out-port; a connection ends at an in-port")]
@@ -173,9 +173,9 @@ impl Violation {
             Self::Transition { .. } => codes::ILLEGAL_TRANSITION,
             Self::NotUnconfigured { .. } => codes::NOT_UNCONFIGURED,
             Self::StillConnected { .. } => codes::STILL_CONNECTED,
-            Self::UnknownMember { what: Member::Port, .. } => codes::UNKNOWN_PORT,
-            Self::UnknownMember { what: Member::Property, .. } => codes::UNKNOWN_PROPERTY,
-            Self::UnknownMember { what: Member::Operation, .. } => codes::UNKNOWN_OPERATION,
+            Self::UnknownMember { what: MemberClass::Port, .. } => codes::UNKNOWN_PORT,
+            Self::UnknownMember { what: MemberClass::Property, .. } => codes::UNKNOWN_PROPERTY,
+            Self::UnknownMember { what: MemberClass::Operation, .. } => codes::UNKNOWN_OPERATION,
             Self::NotOut { .. } => codes::NOT_AN_OUT_PORT,
             Self::NotIn { .. } | Self::WritesOut { .. } => codes::NOT_AN_IN_PORT,
             Self::PortTypes { .. } => codes::PORT_TYPES,

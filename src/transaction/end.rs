@@ -4,7 +4,7 @@ use super::heed::Heed;
 use super::{Can, Transaction, TransactionPhase};
 use crate::model::{Cause, ComponentName, RunState, Snapshot, Step};
 use crate::plan::footprint::Footprint;
-use crate::plan::undo::Item;
+use crate::plan::undo::DraftStep;
 use crate::stack::{Edits, Ending, Frame, FrameId, Inverse, Part, Reason, Residual};
 use crate::system::{Overlay, System, Undo, View as _, step, touch};
 use rustc_hash::FxHashSet;
@@ -13,7 +13,7 @@ use std::sync::Arc;
 
 /// What came of a transaction.
 #[derive(Debug, Clone)]
-pub struct End {
+pub struct TransactionEnd {
     /// What came of each part, in order.
     pub parts: Vec<PartEnd>,
 }
@@ -94,7 +94,7 @@ impl Transaction {
     }
 
     fn over(&mut self, parts: Vec<PartEnd>) {
-        self.end = Some(super::End { parts });
+        self.end = Some(super::TransactionEnd { parts });
         self.phase = TransactionPhase::Over;
     }
 
@@ -228,7 +228,7 @@ impl Transaction {
     /// Everything is being taken down: nobody is asked, and the model is what is known.
     pub(super) fn compare_blind(&mut self, live: &mut System) {
         let nothing = |_: &Step| crate::model::Execution::Blocking;
-        let can = Can { execution: &nothing, room: false, quarantined: &[], busy: &[] };
+        let can = Can { execution: &nothing, batches: &|_| false, room: false, quarantined: &[], busy: &[] };
         let wanted = live.clone();
         self.judge(0, &wanted, false, true, live, &can);
     }
@@ -366,7 +366,7 @@ impl Transaction {
     }
 
     /// What takes back what is left of a part, as far as safe configurations have left it to that.
-    fn items_left(&self, part: usize, live: &System) -> Vec<Item> {
+    fn items_left(&self, part: usize, live: &System) -> Vec<DraftStep> {
         let forward = &self.forward;
         let left: Vec<u32> = (self.remaining(part).into_iter())
             .chain(self.perhaps.iter().copied())
@@ -380,7 +380,7 @@ impl Transaction {
             for back in goes_back.steps {
                 for back in goes_back.instead_of(back, &mut heed, &view) {
                     let _ = step::apply(&back, &mut view);
-                    items.push(Item::undoing(&back, &forward.list[*i as usize]));
+                    items.push(DraftStep::undoing(&back, &forward.list[*i as usize]));
                 }
             }
         }
@@ -392,7 +392,7 @@ impl Transaction {
     fn broken(&self, part: usize, residual: Residual, expected: Snapshot, whole: bool, live: &System) -> PartEnd {
         let planned = &self.planned.parts[part];
         let undone = planned.pushes.is_none();
-        let items: Vec<Item> = if whole && !undone {
+        let items: Vec<DraftStep> = if whole && !undone {
             Vec::new()
         } else if undone {
             self.items_open(planned.own())
@@ -415,7 +415,7 @@ impl Transaction {
 
     /// What is still to be undone of a frame; so is what safe configurations have done again, for whom it never was, and a
     /// call that was given up: taking back half of it is not taking it back.
-    fn items_open(&self, own: Range<u32>) -> Vec<Item> {
+    fn items_open(&self, own: Range<u32>) -> Vec<DraftStep> {
         let forward = &self.forward;
         let theirs = |i: &u32| self.interrupted && self.touched.has(&forward.list[*i as usize].step);
         let done: FxHashSet<u32> = (forward.done.iter())
@@ -423,7 +423,7 @@ impl Transaction {
             .filter_map(|i| self.planned.place(*i as usize))
             .collect();
         let open = own.filter(|place| !done.contains(place) && !self.finished.contains(place));
-        open.map(|place| Item { of: Item::NOWHERE, ..Item::of(&self.whole()[place as usize]) }).collect()
+        open.map(|place| DraftStep { of: DraftStep::NOWHERE, ..DraftStep::of(&self.whole()[place as usize]) }).collect()
     }
 
     /// What was to be undone with a part that is neither done nor taken back: what is gone all the same, and what is left of
@@ -443,7 +443,7 @@ impl Transaction {
 }
 
 /// A frame of which only `items` are left to be undone; it is about these, and about `also`.
-fn partial(frame: &Frame, items: Vec<Item>, also: &FxHashSet<ComponentName>, floor: Option<String>) -> Frame {
+fn partial(frame: &Frame, items: Vec<DraftStep>, also: &FxHashSet<ComponentName>, floor: Option<String>) -> Frame {
     let mut components: FxHashSet<ComponentName> =
         items.iter().flat_map(|item| touch::components(&item.step)).collect();
     components.extend(also);

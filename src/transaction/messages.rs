@@ -8,12 +8,37 @@ use smallvec::SmallVec;
 pub struct Can<'a> {
     /// How a step is carried out on the platform.
     pub execution: &'a dyn Fn(&Step) -> Execution,
+    /// Whether the platform would have a blocking step in one call with others.
+    pub batches: &'a dyn Fn(&Step) -> bool,
     /// Whether there is room for a call that takes time.
     pub room: bool,
     /// Components whose call has not returned.
     pub quarantined: &'a [ComponentName],
     /// Components that an earlier safe configuration has steps for: a later one's come after these.
     pub busy: &'a [ComponentName],
+}
+
+/// How a step gets to the platform.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum CallKind {
+    /// In the configurator's own thread.
+    Immediate,
+    /// In one call with others that begin then.
+    Batched,
+    /// In a call of its own.
+    Alone,
+}
+
+impl Can<'_> {
+    /// How a step gets to the platform. Operations have calls of their own, whatever the platform says: they may take long, run
+    /// beside each other, and are given up one by one.
+    pub(super) fn kind(&self, step: &Step) -> CallKind {
+        match (self.execution)(step) {
+            Execution::Immediate => CallKind::Immediate,
+            Execution::Blocking if !matches!(step, Step::Operation(_)) && (self.batches)(step) => CallKind::Batched,
+            Execution::Blocking => CallKind::Alone,
+        }
+    }
 }
 
 /// What only the values that components show can tell.

@@ -29,7 +29,7 @@ mod settle;
 mod stand;
 mod touched;
 
-pub use end::{BrokenPart, End, PartEnd};
+pub use end::{BrokenPart, PartEnd, TransactionEnd};
 pub use endings::{Stopping, can_fail, endings};
 pub use immediate::Doing;
 pub use limits::{Limit, Spec};
@@ -124,7 +124,7 @@ pub struct Transaction {
     /// Calls of the forward list that were told that they are given up: how far they came nobody knows.
     told: SmallVec<[u32; 1]>,
     mending: Mending,
-    end: Option<End>,
+    end: Option<TransactionEnd>,
 }
 
 impl Transaction {
@@ -246,7 +246,7 @@ impl Transaction {
     }
 
     /// What came of it, once it is over: told once.
-    pub fn end(&mut self) -> End {
+    pub fn end(&mut self) -> TransactionEnd {
         self.end.take().expect("it is over")
     }
 
@@ -399,6 +399,11 @@ impl Transaction {
             }
             _ => self.held || self.taken_down,
         }
+    }
+
+    /// Whether no further step of the list in hand is to begin: what stands in a batch and has not begun need not either.
+    pub fn begins_no_more(&self) -> bool {
+        self.phase == TransactionPhase::Stopping || self.is_stopped() || self.in_hand().stops()
     }
 
     /// The list in hand is over, or stops.

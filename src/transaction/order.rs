@@ -1,17 +1,8 @@
 //! Which steps of a list may begin, kept up to date as steps end.
 
-use crate::model::Execution;
+use super::messages::CallKind;
 use crate::plan::PlannedStep;
 use std::collections::BTreeSet;
-
-/// The place of a kind of execution in a list.
-fn kind(execution: Execution) -> usize {
-    match execution {
-        Execution::Immediate => 0,
-        Execution::Brief => 1,
-        Execution::Blocking => 2,
-    }
-}
 
 /// The order of a list: what each step still waits for.
 #[derive(Debug)]
@@ -22,22 +13,18 @@ pub(super) struct Order {
     starts: Vec<u32>,
     followers: Vec<u32>,
     waves: Vec<u32>,
-    kinds: Vec<u8>,
+    kinds: Vec<CallKind>,
     /// Steps of each wave that are not over.
     left: Vec<usize>,
     wave: u32,
-    /// May begin but for their wave, in the order of the list; immediate, brief and blocking ones apart.
+    /// May begin but for their wave, in the order of the list; each [`CallKind`] apart.
     ready: [BTreeSet<(u32, u32)>; 3],
     over: usize,
 }
 
 impl Order {
     /// The order of `steps`, of which those that `over` says so of are over already.
-    pub fn new(
-        steps: &[PlannedStep],
-        over: &dyn Fn(usize) -> bool,
-        execution: &dyn Fn(&PlannedStep) -> Execution,
-    ) -> Self {
+    pub fn new(steps: &[PlannedStep], over: &dyn Fn(usize) -> bool, kind: &dyn Fn(&PlannedStep) -> CallKind) -> Self {
         let n = steps.len();
         let mut waits = vec![0u32; n];
         let mut starts = vec![0u32; n + 2];
@@ -71,8 +58,7 @@ impl Order {
             starts,
             followers,
             waves: steps.iter().map(|step| step.wave).collect(),
-            #[allow(clippy::cast_possible_truncation)]
-            kinds: steps.iter().map(|step| kind(execution(step)) as u8).collect(),
+            kinds: steps.iter().map(kind).collect(),
             left,
             wave: 0,
             ready: [BTreeSet::new(), BTreeSet::new(), BTreeSet::new()],
@@ -98,8 +84,8 @@ impl Order {
     }
 
     /// The first step of that kind that may begin; it is no longer offered.
-    pub fn next(&mut self, execution: Execution) -> Option<u32> {
-        let ready = &mut self.ready[kind(execution)];
+    pub fn next(&mut self, kind: CallKind) -> Option<u32> {
+        let ready = &mut self.ready[kind as usize];
         let (wave, _) = *ready.first()?;
         if wave > self.wave {
             return None;

@@ -1,7 +1,7 @@
 //! One list of steps being carried out: which may begin, what came of those that did, what is not known yet.
 
 use super::limits::Limit;
-use super::messages::Can;
+use super::messages::{CallKind, Can};
 use super::order::Order;
 use crate::limits;
 use crate::model::{Cause, ComponentName, Execution, Finding, Outcome, RunState, Step};
@@ -28,9 +28,11 @@ enum StepState {
 pub(super) struct StepsRun {
     pub list: Arc<Vec<PlannedStep>>,
     state: Vec<StepState>,
-    /// As long as no step is blocking the list's own order serves, from here on.
+    /// As long as steps are immediate, or make and drop components, the list's own order serves, from here on.
     at: usize,
     order: Option<Order>,
+    /// The last step of the batch that began last. Answers come in order: while this one is out, so is the batch.
+    batch: Option<u32>,
     /// Steps that were done, in the order they were.
     pub done: Vec<u32>,
     pub failures: Vec<(u32, Reason)>,
@@ -73,6 +75,7 @@ impl StepsRun {
             list,
             at: 0,
             order: None,
+            batch: None,
             failures: Vec::new(),
             faulted: Vec::new(),
             unsettled: Vec::new(),
@@ -135,18 +138,17 @@ impl StepsRun {
         }
     }
 
-    /// The next steps that begin now: an immediate one, a blocking one, or several brief ones. Those that must not begin
+    /// The next steps that begin now: an immediate one, one that is called alone, or a batch. Those that must not begin
     /// fail here. Empty: nothing can begin.
     pub fn begin(&mut self, live: &System, now: Time, can: &Can<'_>) -> SmallVec<[u32; 1]> {
-        let (execution, room) = (can.execution, can.room);
-        let kind = |planned: &PlannedStep| execution(&planned.step);
+        let kind = |planned: &PlannedStep| can.kind(&planned.step);
         while self.order.is_none() && self.at < self.list.len() {
             if self.stops() {
                 return smallvec![];
             }
             let at = self.at;
             if self.state[at] != StepState::Waiting {
-                // Brief ones that are out, or over.
+                // Of a batch that is out, or over.
                 if matches!(self.state[at], StepState::Out(_)) {
                     return smallvec![];
                 }
@@ -157,11 +159,7 @@ impl StepsRun {
                 return smallvec![];
             }
             match kind(&self.list[at]) {
-                Execution::Blocking => {
-                    let state = &self.state;
-                    self.order = Some(Order::new(&self.list, &|i| state[i] == StepState::Over, &kind));
-                }
-                Execution::Immediate => {
+                CallKind::Immediate => {
                     if self.out > 0 {
                         return smallvec![];
                     }
@@ -169,14 +167,18 @@ impl StepsRun {
                         return smallvec![i];
                     }
                 }
-                Execution::Brief => {
-                    if self.out > 0 || !room {
+                CallKind::Batched if makes_or_drops(&self.list[at].step) => {
+                    if self.out > 0 || !can.room {
                         return smallvec![];
                     }
-                    let begun = self.brief(live, now, &kind, can);
+                    let begun = self.in_a_row(live, now, can);
                     if !begun.is_empty() {
                         return begun;
                     }
+                }
+                CallKind::Batched | CallKind::Alone => {
+                    let state = &self.state;
+                    self.order = Some(Order::new(&self.list, &|i| state[i] == StepState::Over, &kind));
                 }
             }
         }
@@ -219,14 +221,9 @@ impl StepsRun {
         self.at = i as usize + 1;
     }
 
-    /// Brief steps from the present place on, none of which may need another: each is about a component of its own.
-    fn brief(
-        &mut self,
-        live: &System,
-        now: Time,
-        kind: &dyn Fn(&PlannedStep) -> Execution,
-        can: &Can<'_>,
-    ) -> SmallVec<[u32; 1]> {
+    /// A batch from the present place on of steps that make or drop components, none of which may need another: each is about a
+    /// component of its own.
+    fn in_a_row(&mut self, live: &System, now: Time, can: &Can<'_>) -> SmallVec<[u32; 1]> {
         let mut items: SmallVec<[u32; 1]> = SmallVec::new();
         let mut about = FxHashSet::<ComponentName>::default();
         for at in self.at..self.list.len() {
@@ -234,12 +231,11 @@ impl StepsRun {
                 continue;
             }
             let step = &self.list[at].step;
-            if items.len() == limits::BRIEF_STEPS
-                || kind(&self.list[at]) != Execution::Brief
+            if items.len() == limits::BATCH_STEPS
+                || !makes_or_drops(step)
+                || can.kind(step) != CallKind::Batched
                 || !about.insert(step.component())
                 || is_busy(step, can)
-                // Those that begin together end together.
-                || items.first().is_some_and(|first| self.limit(*first as usize) != self.limit(at))
             {
                 break;
             }
@@ -284,14 +280,16 @@ impl StepsRun {
             }
             let Some(order) = &mut self.order else { return smallvec![] };
             let mut ready = SmallVec::<[u32; 1]>::new();
-            if let Some(i) = order.next(Execution::Immediate) {
+            let mut batched = false;
+            if let Some(i) = order.next(CallKind::Immediate) {
                 ready.push(i);
             } else if can.room {
-                if let Some(i) = order.next(Execution::Blocking) {
+                if let Some(i) = order.next(CallKind::Alone) {
                     ready.push(i);
-                } else {
-                    let brief = std::iter::from_fn(|| order.next(Execution::Brief));
-                    ready.extend(brief.take(limits::BRIEF_STEPS));
+                } else if !self.batch.is_some_and(|last| matches!(self.state[last as usize], StepState::Out(_))) {
+                    // What becomes ready while a batch is out goes with the next, not alone beside it.
+                    ready.extend(std::iter::from_fn(|| order.next(CallKind::Batched)).take(limits::BATCH_STEPS));
+                    batched = true;
                 }
             }
             if ready.is_empty() {
@@ -311,6 +309,9 @@ impl StepsRun {
                     self.state[*i as usize] = StepState::Out(live.revision());
                 }
                 self.out += ready.len();
+                if batched {
+                    self.batch = ready.last().copied();
+                }
                 return ready;
             }
         }
@@ -451,6 +452,11 @@ impl StepsRun {
         self.finish(i);
         self.unsettled.push(i);
     }
+}
+
+/// Of such steps that are about different components none needs another.
+fn makes_or_drops(step: &Step) -> bool {
+    matches!(step, Step::Create { .. } | Step::Destroy { .. })
 }
 
 /// Whether a step comes after what an earlier safe configuration still does.

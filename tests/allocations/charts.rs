@@ -2,10 +2,10 @@
 //! timed.
 
 use crate::counting::{made, made_by};
-use davit::coordinator::{Class, Coordinator, Core, Incoming, Listener};
+use davit::coordinator::{Class, CoordinatorHandle, Core, Incoming, Listener};
 use davit::model::finding::Origin;
 use davit::model::names::{ConfigId, EventName, Ident};
-use davit::model::statechart::{Action, Node, State, Statechart, Transition, Trigger};
+use davit::model::statechart::{Action, ChartNode, ChartTransition, State, Statechart, Trigger};
 use davit::statechart::{Chart, EventId, Machine, Nobody, Raised, compile};
 use davit::time::{Clock, Time};
 use std::sync::Arc;
@@ -16,8 +16,8 @@ fn state(name: &str) -> State {
     State::new(Ident::new(name).unwrap())
 }
 
-fn transition(src: &str, tgt: &str, event: &str) -> Transition {
-    Transition::new(src, tgt, (!event.is_empty()).then(|| Trigger::parse(event).unwrap()))
+fn transition(src: &str, tgt: &str, event: &str) -> ChartTransition {
+    ChartTransition::new(src, tgt, (!event.is_empty()).then(|| Trigger::parse(event).unwrap()))
 }
 
 /// Three levels: groups of `per_group` leaves in a ring, groups in a ring.
@@ -31,11 +31,11 @@ fn rings(groups: usize, per_group: usize) -> Chart {
         for i in 0..per_group {
             let mut leaf = state(&format!("s{i}"));
             leaf.entry.push((Action::Raise(EventName::new("entered").unwrap()), Origin::NONE));
-            group.children.push(Node::State(leaf));
+            group.children.push(ChartNode::State(leaf));
             group.transitions.push(transition(&format!("s{i}"), &format!("s{}", (i + 1) % per_group), "next"));
             group.transitions.push(transition(&format!("s{i}"), "s0", "e_after(1)"));
         }
-        root.children.push(Node::State(group));
+        root.children.push(ChartNode::State(group));
         root.transitions.push(transition(&format!("g{g}"), &format!("g{}", (g + 1) % groups), "over"));
     }
     let (chart, findings) = compile(&Statechart::new(root));
@@ -94,11 +94,11 @@ fn a_coordinator_takes_events_of_every_class_without_allocating() {
     let mut root = state("root");
     let mut leaf = state("on");
     leaf.entry.push((Action::Raise(EventName::new("entered").unwrap()), Origin::NONE));
-    root.children.push(Node::State(leaf));
+    root.children.push(ChartNode::State(leaf));
     root.transitions.push(transition("initial", "on", ""));
     root.transitions.push(transition("on", "on", "next"));
     let (chart, _) = compile(&Statechart::new(root));
-    let coordinator = Coordinator::start("coordinator", Arc::new(chart.unwrap()), &clock, listener);
+    let coordinator = CoordinatorHandle::start("coordinator", Arc::new(chart.unwrap()), &clock, listener);
     let next = EventName::new("next").unwrap();
     let all = [Class::Urgent, Class::Answer, Class::Notice, Class::Report, Class::Outside];
     let (mut sent, mut begun) = (1, None);
@@ -153,7 +153,7 @@ fn what_a_step_costs_does_not_depend_on_how_many_transitions_leave_its_state() {
     // Through the general engine, as compiling asks it for every reaction.
     let cost = |count: usize| {
         let mut root = state("root");
-        root.children.extend([Node::State(state("a")), Node::State(state("b"))]);
+        root.children.extend([ChartNode::State(state("a")), ChartNode::State(state("b"))]);
         root.transitions.push(transition("initial", "a", ""));
         root.transitions.push(transition("b", "a", "back"));
         root.transitions.extend((0..count).map(|n| transition("a", "b", &format!("e{n}"))));
@@ -181,12 +181,13 @@ fn what_a_step_costs_does_not_depend_on_how_many_transitions_leave_its_state() {
 fn a_net_of_connectors_costs_its_transitions_not_its_paths() {
     // 60 layers of two connectors, each leading to both of the next layer, and nothing at the end: 2^60 paths.
     let mut root = state("root");
-    root.children.push(Node::State(state("a")));
-    root.children.push(Node::State(state("b")));
+    root.children.push(ChartNode::State(state("a")));
+    root.children.push(ChartNode::State(state("b")));
     for layer in 0..60 {
         for side in 0..2 {
             let name = format!("k{layer}_{side}");
-            root.children.push(Node::Connector(davit::model::statechart::Connector::new(Ident::new(&name).unwrap())));
+            root.children
+                .push(ChartNode::Connector(davit::model::statechart::Connector::new(Ident::new(&name).unwrap())));
             for next in 0..2 {
                 let target = if layer == 59 { "b".to_owned() } else { format!("k{}_{next}", layer + 1) };
                 root.transitions.push(transition(&name, &target, if layer == 59 { "never" } else { "" }));

@@ -2,7 +2,7 @@
 
 use crate::counting::Together;
 use davit::lang::{LoadOptions, Sources, load_monitors};
-use davit::monitor::{Bank, Sample};
+use davit::monitor::{Bank, InputSample};
 use davit::time::Time;
 use std::path::Path;
 
@@ -27,7 +27,7 @@ fn evaluating_allocates_nothing() {
     assert!(loaded.findings.is_empty(), "{:?}", loaded.findings);
     // A copy too: a component is made of a template.
     let mut bank = Bank::new(&loaded.monitors).clone();
-    let mut samples = vec![Sample::default(); bank.inputs().len()];
+    let mut samples = vec![InputSample::default(); bank.inputs().len()];
     let mut raised = 0_u64;
     let mut seed = 7_u64;
     COUNT.add_thread();
@@ -40,7 +40,7 @@ fn evaluating_allocates_nothing() {
                 // Noise, and a ramp that needs more memory than an operator has.
                 let noise = (seed >> 33) as f64 / (1_u64 << 31) as f64;
                 let value = if n == 3 { i as f64 * 1e-3 } else { noise };
-                *sample = Sample { value, at: now, writes: sample.writes + 1, present: true };
+                *sample = InputSample { value, at: now, writes: sample.writes + 1, present: true };
             }
         }
         if i % 1000 == 999 {

@@ -4,8 +4,8 @@
 use crate::counting::made_by;
 use davit::model::*;
 use davit::plan::footprint::Saved;
-use davit::plan::{Context, plan};
-use davit::stack::{Op, Requester, Resolved, Scope, Stack, Switch, transaction};
+use davit::plan::{PlanContext, plan};
+use davit::stack::{Op, Requester, ResolvedStep, Scope, Stack, Switch, transaction};
 use davit::system::{System, step};
 use davit::time::Time;
 use std::sync::Arc;
@@ -47,7 +47,7 @@ fn arm() -> System {
     };
     up.changes.push(Change { kind: create, origin: Origin::NONE });
     up.post.push(StateEntry { target: Target::Default, state: Wanted::Running, origin: Origin::NONE }).unwrap();
-    for s in plan(&system, &up, &Context::default()).unwrap().steps {
+    for s in plan(&system, &up, &PlanContext::default()).unwrap().steps {
         step::apply(&s.step, &mut system).unwrap();
     }
     system
@@ -71,7 +71,7 @@ fn switch(gain: f64) -> Configuration {
 /// Does the steps as the configurator does, and says how many.
 fn perform(switch: &Switch, undoing: bool, system: &mut System) -> usize {
     let mut done = 0;
-    while let Some(Resolved { step, place, value, .. }) = switch.step(done, undoing) {
+    while let Some(ResolvedStep { step, place, value, .. }) = switch.step(done, undoing) {
         std::hint::black_box(value);
         assert!(place.precondition(step, system).is_empty());
         place.effect(step, system);
@@ -88,7 +88,7 @@ fn a_prepared_switch_allocates_nothing() {
     let (requester, at, scope) = (Requester::Operator, Time(1), Some(Scope(1)));
     let push = Op::Push { configuration: &configuration, requester, at, scope };
     let plan = |system: &mut System, stack: &mut Stack| {
-        let planned = transaction(system, stack, &[push], &Context::default()).unwrap();
+        let planned = transaction(system, stack, &[push], &PlanContext::default()).unwrap();
         let switch = Switch::new(system, &configuration, &planned).expect("a fixed switch");
         for planned in planned.steps.iter() {
             step::apply(&planned.step, system).unwrap();
@@ -100,7 +100,7 @@ fn a_prepared_switch_allocates_nothing() {
     let mut first = None;
     assert!(made_by(|| first = Some(plan(&mut system, &mut stack))) > 0, "the counter counts");
     let mut switch = first.unwrap();
-    let undo = transaction(&system, &stack, &[Op::UndoTop], &Context::default()).unwrap();
+    let undo = transaction(&system, &stack, &[Op::UndoTop], &PlanContext::default()).unwrap();
     for planned in undo.steps.iter() {
         step::apply(&planned.step, &mut system).unwrap();
     }

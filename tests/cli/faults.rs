@@ -122,6 +122,7 @@ fn what_cannot_go_wrong_is_refused_before_or_after_the_deployment() {
         ("fault('property_set source.k', 'fail', 1.5)", "1.5 is not a number of times"),
         ("fault('property_set source.k', 'fail', 1e9)", "1000000000 is not a number of times"),
         ("fault('property_set source.k', 'fail', 0/0)", "is not a number of times"),
+        ("deploy('deployment.yaml') wait('fast.ok')", "what waits for an answer is `wait_answer("),
         ("fault('proprety_set source.k', 'fail')", "did you mean `property_set`?"),
         ("fault('', 'fail')", "`` is no step"),
         ("fault('property_set source.kk', 'fail')", "did you mean `k`?"),

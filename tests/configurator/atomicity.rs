@@ -8,7 +8,7 @@ mod generate;
 use crate::rig::*;
 use davit::configurator::{Reason, Recovery, Requester};
 use davit::model::{Catalogue, Configuration, DeploymentLimits, RunState, Snapshot, Verdict};
-use davit::platform::simulated::{Fault, FaultRule, Faults, Options};
+use davit::platform::simulated::{Fault, FaultRule, Faults, SimulatedOptions};
 use davit::system::{System, step};
 use proptest::prelude::*;
 use std::sync::Arc;
@@ -242,7 +242,7 @@ proptest! {
                 catalogue.clone(),
                 generate::context().activities,
                 all.clone(),
-                Options::default(),
+                SimulatedOptions::default(),
                 |platform| Arc::new(platform),
                 DeploymentLimits::default(),
             );

@@ -3,7 +3,7 @@
 
 use crate::rig::*;
 use davit::model::Configuration;
-use davit::platform::simulated::{Delays, Fault, Options};
+use davit::platform::simulated::{Delays, Fault, SimulatedOptions};
 use std::time::Duration;
 
 /// `on` makes A, `off` makes B, `low` and `high` are of one group, `calm` is safe. Every step takes a second.
@@ -22,7 +22,9 @@ fn slow() -> Rig {
         Configuration { safe: true, ..configuration("rest", "", "set A.k 0", "") },
     ];
     let delays = Delays { base: Duration::from_secs(1), ..Delays::default() };
-    Rig::with(configurations, Options { delays, ..Options::default() }, |platform| std::sync::Arc::new(platform))
+    Rig::with(configurations, SimulatedOptions { delays, ..SimulatedOptions::default() }, |platform| {
+        std::sync::Arc::new(platform)
+    })
 }
 
 fn made() -> Rig {

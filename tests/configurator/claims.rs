@@ -4,7 +4,7 @@
 use crate::rig::*;
 use davit::configurator::Requester;
 use davit::model::{Configuration, Confirm, DeploymentLimits};
-use davit::platform::simulated::{Delays, Fault, FaultRule, Faults, Options, StepPattern};
+use davit::platform::simulated::{Delays, Fault, FaultRule, Faults, SimulatedOptions, StepPattern};
 use proptest::prelude::*;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -58,8 +58,12 @@ fn asked() -> impl Strategy<Value = Asked> {
 
 fn rig(delays: Delays) -> Rig {
     let limits = DeploymentLimits { step_timeout: Duration::from_secs(30), ..DeploymentLimits::default() };
-    let rig =
-        Rig::full(configurations(), Options { delays, ..Options::default() }, |platform| Arc::new(platform), limits);
+    let rig = Rig::full(
+        configurations(),
+        SimulatedOptions { delays, ..SimulatedOptions::default() },
+        |platform| Arc::new(platform),
+        limits,
+    );
     assert_eq!(rig.ask("make"), ["make.ok"]);
     rig.platform.set_faults(Faults::new([FaultRule::on("property_set C.k = 9.0", Fault::Fail)]));
     rig
@@ -151,7 +155,7 @@ fn what_operators_push_at_once_has_no_more_places_than_there_are() {
     ];
     let limits = DeploymentLimits { stack: 2, ..DeploymentLimits::default() };
     let delays = || Delays { base: Duration::from_millis(500), ..Delays::default() };
-    let options = || Options { delays: delays(), ..Options::default() };
+    let options = || SimulatedOptions { delays: delays(), ..SimulatedOptions::default() };
     let rig = Rig::full(all.clone(), options(), |platform| Arc::new(platform), limits);
     assert_eq!(rig.ask("make"), ["make.ok"]);
     // Neither of two can be squashed: one waits for its confirmation, and the other one is the newest.

@@ -3,7 +3,7 @@
 use crate::rig::*;
 use davit::configurator::{Batch, Request, Requester};
 use davit::model::{Ask, Configuration, DeploymentLimits, OnFailure, RequestId};
-use davit::platform::simulated::{Delays, Fault, Options, StepPattern};
+use davit::platform::simulated::{Delays, Fault, SimulatedOptions, StepPattern};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -165,7 +165,7 @@ fn what_a_safe_configuration_interrupts_goes_back_without_its_call() {
 #[test]
 fn a_squashed_frame_keeps_and_leaves_calls_as_its_parts() {
     let limits = DeploymentLimits { stack: 2, ..DeploymentLimits::default() };
-    let rig = Rig::full(configurations(), Options::default(), |platform| Arc::new(platform), limits);
+    let rig = Rig::full(configurations(), SimulatedOptions::default(), |platform| Arc::new(platform), limits);
     assert_eq!(rig.ask("make"), ["make.ok"]);
     rig.platform.record();
     let operator = Requester::Operator;

@@ -2,7 +2,6 @@
 
 mod atomicity;
 mod batches;
-mod brief;
 mod claims;
 mod kept_calls;
 #[path = "../support/names.rs"]
@@ -13,6 +12,7 @@ mod repair;
 mod rig;
 mod safe;
 mod safe_ends;
+mod step_batches;
 mod stuck;
 mod survival;
 mod table;

@@ -3,7 +3,7 @@
 use super::rig::*;
 use davit::configurator::{Progress, Recovery};
 use davit::model::*;
-use davit::platform::simulated::{Fault, Options, Simulated};
+use davit::platform::simulated::{Fault, Simulated, SimulatedOptions};
 use davit::platform::{EventSink, ObserveError, Platform};
 use davit::time::Time;
 use std::sync::Arc;
@@ -164,7 +164,7 @@ impl Platform for SlowEyes {
 
 #[test]
 fn what_was_done_while_the_platform_looked_is_no_difference() {
-    let rig = Rig::with(scenario(), Options::default(), |inner| Arc::new(SlowEyes { inner }));
+    let rig = Rig::with(scenario(), SimulatedOptions::default(), |inner| Arc::new(SlowEyes { inner }));
     for word in ["make", "wire", "run"] {
         assert_eq!(rig.ask(word), [format!("{word}.ok")]);
     }

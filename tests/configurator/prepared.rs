@@ -2,7 +2,7 @@
 
 use crate::rig::*;
 use davit::model::*;
-use davit::platform::simulated::{Options, Simulated};
+use davit::platform::simulated::{Simulated, SimulatedOptions};
 use davit::platform::*;
 use davit::time::Time;
 use std::sync::Arc;
@@ -44,7 +44,7 @@ impl Platform for Counting {
 fn up() -> (Rig, Arc<AtomicUsize>) {
     let prepared = Arc::new(AtomicUsize::new(0));
     let count = prepared.clone();
-    let rig = Rig::with(scenario(), Options::default(), move |inner| Arc::new(Counting { inner, prepared }));
+    let rig = Rig::with(scenario(), SimulatedOptions::default(), move |inner| Arc::new(Counting { inner, prepared }));
     for word in ["make", "wire", "run"] {
         assert_eq!(rig.ask(word), [format!("{word}.ok")]);
     }

@@ -4,7 +4,7 @@ use crate::rig::*;
 use davit::configurator::{ConfiguratorHandle, Progress, Recovery};
 use davit::model::*;
 use davit::platform::Platform;
-use davit::platform::simulated::{Fault, Options, Simulated};
+use davit::platform::simulated::{Fault, Simulated, SimulatedOptions};
 use davit::stack::{Batch, Request};
 use davit::time::Time;
 use std::collections::BTreeSet;
@@ -99,7 +99,7 @@ impl Bench {
         let watched = meanwhile.clone();
         let limits = DeploymentLimits::default();
         let wrap = |inner| Arc::new(Watched { inner, meanwhile: watched }) as Arc<dyn Platform>;
-        let rig = Rig::of(catalogue, BTreeSet::new(), all, Options::default(), wrap, limits);
+        let rig = Rig::of(catalogue, BTreeSet::new(), all, SimulatedOptions::default(), wrap, limits);
         let operator = davit::stack::Requester::Operator;
         assert_eq!(rig.ask_as("make", operator), ["make.ok"]);
         assert_eq!(rig.ask_as("commit!", operator), ["commit.ok"]);

@@ -4,7 +4,7 @@ pub use crate::names::{event, id, ident, member, name};
 use davit::configurator::*;
 use davit::model::*;
 use davit::platform::Platform;
-use davit::platform::simulated::{Fault, FaultRule, Faults, Options, Simulated};
+use davit::platform::simulated::{Fault, FaultRule, Faults, Simulated, SimulatedOptions};
 use davit::stack::Why;
 use davit::time::{Clock, Guard};
 use std::collections::{BTreeMap, BTreeSet};
@@ -97,6 +97,13 @@ pub fn configuration(name: &str, pre: &str, changes: &str, post: &str) -> Config
 /// What a platform around a simulated one leaves to that: everything but how steps are carried out.
 macro_rules! leaves_to_inner {
     () => {
+        leaves_to_inner!(all but cancel);
+
+        fn cancel(&self, step: &davit::model::Step) {
+            self.inner.cancel(step);
+        }
+    };
+    (all but cancel) => {
         fn catalogue(&self) -> &davit::model::Catalogue {
             self.inner.catalogue()
         }
@@ -109,9 +116,6 @@ macro_rules! leaves_to_inner {
             deadline: Time,
         ) -> Result<davit::model::Snapshot, davit::platform::ObserveError> {
             self.inner.observe_some(components, deadline)
-        }
-        fn cancel(&self, step: &davit::model::Step) {
-            self.inner.cancel(step);
         }
         fn observe_component(
             &self,
@@ -149,12 +153,12 @@ pub fn coordinator(name_: &str) -> Requester {
 
 impl Rig {
     pub fn new(configurations: Vec<Configuration>) -> Self {
-        Self::with(configurations, Options::default(), |platform| Arc::new(platform))
+        Self::with(configurations, SimulatedOptions::default(), |platform| Arc::new(platform))
     }
 
     pub fn with(
         configurations: Vec<Configuration>,
-        options: Options,
+        options: SimulatedOptions,
         wrap: impl FnOnce(Simulated) -> Arc<dyn Platform>,
     ) -> Self {
         Self::full(configurations, options, wrap, DeploymentLimits::default())
@@ -162,7 +166,7 @@ impl Rig {
 
     pub fn full(
         configurations: Vec<Configuration>,
-        options: Options,
+        options: SimulatedOptions,
         wrap: impl FnOnce(Simulated) -> Arc<dyn Platform>,
         limits: DeploymentLimits,
     ) -> Self {
@@ -173,7 +177,7 @@ impl Rig {
         catalogue: Catalogue,
         activities: BTreeSet<Ident>,
         configurations: Vec<Configuration>,
-        options: Options,
+        options: SimulatedOptions,
         wrap: impl FnOnce(Simulated) -> Arc<dyn Platform>,
         limits: DeploymentLimits,
     ) -> Self {

@@ -3,7 +3,7 @@
 use crate::rig::*;
 use davit::configurator::Requester;
 use davit::model::{Ask, Configuration, RequestId, RunState, Value, Verdict};
-use davit::platform::simulated::{Delays, Fault, FaultRule, Faults, Options, StepPattern};
+use davit::platform::simulated::{Delays, Fault, FaultRule, Faults, SimulatedOptions, StepPattern};
 use davit::stack::{Batch, Request, Scope};
 use std::sync::Arc;
 use std::time::Duration;
@@ -460,7 +460,9 @@ fn an_undo_that_is_refused_and_interrupted_is_not_about_the_next_visit() {
 fn a_safe_configuration_does_not_wait_for_a_look() {
     let mut all = scenario();
     all.push(Configuration { safe: true, ..configuration("low", "", "", "A:stopped") });
-    let rig = Rig::with(all, Options { blocking: true, ..Options::default() }, |platform| Arc::new(platform));
+    let rig = Rig::with(all, SimulatedOptions { blocking: true, ..SimulatedOptions::default() }, |platform| {
+        Arc::new(platform)
+    });
     for word in ["make", "wire", "run"] {
         rig.ask(word);
     }

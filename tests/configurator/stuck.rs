@@ -4,7 +4,7 @@ use crate::rig::*;
 use davit::configurator::Progress;
 use davit::limits;
 use davit::model::*;
-use davit::platform::simulated::{Options, Simulated};
+use davit::platform::simulated::{Simulated, SimulatedOptions};
 use davit::platform::{Execution, Outcome, Platform};
 use davit::time::Time;
 use std::sync::Arc;
@@ -47,7 +47,7 @@ fn calls_that_never_return_are_bounded_and_what_is_safe_gets_through() {
     ];
     let stuck = Arc::new(AtomicUsize::new(0));
     let count = stuck.clone();
-    let options = Options { blocking: true, ..Options::default() };
+    let options = SimulatedOptions { blocking: true, ..SimulatedOptions::default() };
     let rig = Rig::with(all, options, move |inner| Arc::new(Sticky { inner, stuck }));
     assert_eq!(rig.ask("make"), ["make.ok"]);
     // All workers are out, and none of them was given up yet.

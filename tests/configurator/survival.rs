@@ -3,7 +3,7 @@
 use crate::rig::*;
 use davit::configurator::{Reason, Recovery};
 use davit::model::*;
-use davit::platform::simulated::{Delays, Fault, FaultRule, Faults, Options, Simulated, StepPattern};
+use davit::platform::simulated::{Delays, Fault, FaultRule, Faults, Simulated, SimulatedOptions, StepPattern};
 use davit::platform::*;
 use davit::time::Time;
 use std::sync::Arc;
@@ -269,7 +269,7 @@ impl Platform for Treacherous {
 fn a_panic_in_the_configurator_is_answered_and_survived() {
     let armed = Arc::new(AtomicBool::new(false));
     let arm = armed.clone();
-    let rig = Rig::with(scenario(), Options::default(), move |inner| Arc::new(Treacherous { inner, armed }));
+    let rig = Rig::with(scenario(), SimulatedOptions::default(), move |inner| Arc::new(Treacherous { inner, armed }));
     for word in ["make", "wire", "run"] {
         assert_eq!(rig.ask(word), [format!("{word}.ok")]);
     }
@@ -324,7 +324,7 @@ fn after_a_panic_while_everything_is_taken_down_requests_begin_again() {
     let arm = armed.clone();
     let mut all = scenario();
     all.push(configuration("fresh", "", "create D", ""));
-    let rig = Rig::with(all, Options::default(), move |inner| Arc::new(Treacherous { inner, armed }));
+    let rig = Rig::with(all, SimulatedOptions::default(), move |inner| Arc::new(Treacherous { inner, armed }));
     for word in ["make", "wire"] {
         assert_eq!(rig.ask(word), [format!("{word}.ok")]);
     }
@@ -342,7 +342,9 @@ fn after_a_panic_while_everything_is_taken_down_requests_begin_again() {
 /// Whoever asked for what is under way when the configurator ends is told: nobody knows how far it came.
 #[test]
 fn what_is_under_way_at_the_end_is_answered() {
-    let rig = Rig::with(scenario(), Options { blocking: true, ..Options::default() }, |platform| Arc::new(platform));
+    let rig = Rig::with(scenario(), SimulatedOptions { blocking: true, ..SimulatedOptions::default() }, |platform| {
+        Arc::new(platform)
+    });
     rig.inject("create B", Fault::Slow(Duration::from_secs(2)));
     rig.submit("make");
     rig.submit("wire");

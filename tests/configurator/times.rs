@@ -2,7 +2,7 @@
 
 use crate::rig::*;
 use davit::model::*;
-use davit::platform::simulated::{Fault, FaultRule, Faults, Options};
+use davit::platform::simulated::{Fault, FaultRule, Faults, SimulatedOptions};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -26,7 +26,12 @@ fn rig(slow: &[(&str, f64)]) -> Rig {
         configuration.timeout = own.map(Duration::from_secs_f64);
     }
     let limits = DeploymentLimits { step_timeout: Duration::from_secs(1), ..DeploymentLimits::default() };
-    let rig = Rig::full(all, Options { blocking: true, ..Options::default() }, |platform| Arc::new(platform), limits);
+    let rig = Rig::full(
+        all,
+        SimulatedOptions { blocking: true, ..SimulatedOptions::default() },
+        |platform| Arc::new(platform),
+        limits,
+    );
     assert_eq!(rig.ask("base mode"), ["base.ok", "mode.ok"]);
     let rules = slow.iter().map(|(step, s)| FaultRule::on(step, Fault::Slow(Duration::from_secs_f64(*s))));
     rig.platform.set_faults(Faults::new(rules));

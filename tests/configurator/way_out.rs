@@ -7,7 +7,7 @@ use davit::model::{
     Catalogue, Configuration, Confirm, DeploymentLimits, Effect, Moves, OnFailure, OperationType, PropertyType,
     Tunable, Verdict,
 };
-use davit::platform::simulated::{Delays, Fault, FaultRule, Faults, Options, StepPattern};
+use davit::platform::simulated::{Delays, Fault, FaultRule, Faults, SimulatedOptions, StepPattern};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 use std::collections::BTreeSet;
@@ -193,7 +193,7 @@ fn leads_out(acts: &[(Act, usize)], faults: &[(usize, usize, u32)]) -> Result<&'
     let limits = DeploymentLimits { step_timeout: Duration::from_millis(500), ..DeploymentLimits::default() };
     let of = [("start", 0.1), ("stop", 0.05), ("cleanup", 0.05), ("configure", 0.1), ("operation_call", 0.3)];
     let of = of.map(|(pattern, seconds)| (StepPattern::new(pattern), Duration::from_secs_f64(seconds))).to_vec();
-    let options = Options { delays: Delays { of, ..Delays::default() }, ..Options::default() };
+    let options = SimulatedOptions { delays: Delays { of, ..Delays::default() }, ..SimulatedOptions::default() };
     let rig = Rig::of(moving(), BTreeSet::new(), configurations(), options, |platform| Arc::new(platform), limits);
     let start = rig.see();
     prop_assert_eq!(rig.ask(MAKE), ["make.ok"]);

@@ -2,7 +2,7 @@
 
 use davit::app;
 use davit::lang::{LoadOptions, Sources};
-use davit::platform::simulated::{Options, Simulated};
+use davit::platform::simulated::{Simulated, SimulatedOptions};
 use davit::session::Happening;
 use davit::time::Clock;
 use std::path::Path;
@@ -73,7 +73,7 @@ fn watched(coordinator: &str, seconds: u64, look: impl FnOnce(&Arc<davit::sessio
     let checked = app::check(read).unwrap_or_else(|refused| panic!("{:?}", refused.findings));
     let clock = Clock::simulated();
     let _me = clock.enter();
-    let platform = Arc::new(Simulated::new(checked.catalogue.clone(), clock.clone(), Options::default()));
+    let platform = Arc::new(Simulated::new(checked.catalogue.clone(), clock.clone(), SimulatedOptions::default()));
     let session = app::start_on(&checked, platform, &clock);
     let said: Arc<Mutex<Vec<String>>> = Arc::default();
     let heard = said.clone();
@@ -144,7 +144,7 @@ fn a_coordinator_that_hangs_in_a_function_is_told() {
     let checked = app::check(read).unwrap_or_else(|refused| panic!("{:?}", refused.findings));
     let clock = Clock::real();
     let _me = clock.enter();
-    let platform = Arc::new(Simulated::new(checked.catalogue.clone(), clock.clone(), Options::default()));
+    let platform = Arc::new(Simulated::new(checked.catalogue.clone(), clock.clone(), SimulatedOptions::default()));
     let session = app::start_on(&checked, platform, &clock);
     let told: Arc<Mutex<Vec<(String, f64)>>> = Arc::default();
     let heard = told.clone();

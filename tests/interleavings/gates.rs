@@ -1,6 +1,6 @@
 //! The gate of a component: one visitor at a time, whoever tries.
 
-use crate::gate::{Closed, Gate, Gated, Inside};
+use crate::gate::{Closed, Gate, GateGuard, Gated};
 use crate::model::{RunState, Transition};
 use crate::sync::Arc;
 use loom::thread;
@@ -19,12 +19,12 @@ unsafe impl Gated for Visited {
 
 fn in_state(state: RunState) -> Arc<Visited> {
     let visited = Arc::new(Visited(Gate::new(0)));
-    Inside::idle(&*visited, false, |_| true).unwrap().leave(Some(state));
+    GateGuard::idle(&*visited, false, |_| true).unwrap().leave(Some(state));
     visited
 }
 
 fn visits(visited: &Visited) -> u32 {
-    Inside::for_operation(visited, true).unwrap().with(|_, n| *n)
+    GateGuard::for_operation(visited, true).unwrap().with(|_, n| *n)
 }
 
 #[test]
@@ -34,7 +34,7 @@ fn an_update_and_a_step_never_meet() {
         let other = visited.clone();
         let stepping = thread::spawn(move || {
             other.0.shift(Transition::Stop, false).unwrap();
-            match Inside::idle(&*other, false, |_| true) {
+            match GateGuard::idle(&*other, false, |_| true) {
                 Ok(mut inside) => {
                     inside.with(|_, n| *n += 1);
                     1
@@ -47,7 +47,7 @@ fn an_update_and_a_step_never_meet() {
         });
         let mut done = 0;
         for _ in 0..2 {
-            if let Some(mut inside) = Inside::running(&*visited) {
+            if let Some(mut inside) = GateGuard::running(&*visited) {
                 inside.with(|_, n| *n += 1);
                 inside.leave(None);
                 done += 1;
@@ -63,14 +63,14 @@ fn an_update_and_a_step_never_meet() {
 fn the_first_update_sees_what_the_hook_before_it_did() {
     loom::model(|| {
         let visited = in_state(RunState::Stopped);
-        let mut inside = Inside::idle(&*visited, false, |_| true).unwrap().sent(&visited);
+        let mut inside = GateGuard::idle(&*visited, false, |_| true).unwrap().sent(&visited);
         let starting = thread::spawn(move || {
             inside.with(|_, n| *n += 1);
             inside.leave(Some(RunState::Running));
         });
         // As an activity does, beat after beat.
         let mut inside = loop {
-            match Inside::running(&*visited) {
+            match GateGuard::running(&*visited) {
                 Some(inside) => break inside,
                 None => thread::yield_now(),
             }
@@ -90,8 +90,8 @@ fn of_two_that_try_one_is_inside() {
     loom::model(|| {
         let visited = in_state(RunState::Stopped);
         let visit = |visited: Arc<Visited>| {
-            assert!(Inside::running(&*visited).is_none(), "it does not run");
-            match Inside::idle(&*visited, false, |_| true) {
+            assert!(GateGuard::running(&*visited).is_none(), "it does not run");
+            match GateGuard::idle(&*visited, false, |_| true) {
                 Ok(mut inside) => {
                     inside.with(|_, n| *n += 1);
                     1
@@ -112,7 +112,7 @@ fn a_right_that_is_sent_leaves_once_used_or_not() {
     for used in [true, false] {
         loom::model(move || {
             let visited = in_state(RunState::Stopped);
-            let mut inside = Inside::idle(&*visited, false, |_| true).unwrap().sent(&visited);
+            let mut inside = GateGuard::idle(&*visited, false, |_| true).unwrap().sent(&visited);
             let working = thread::spawn(move || {
                 if used {
                     inside.with(|_, n| *n += 1);
@@ -120,7 +120,7 @@ fn a_right_that_is_sent_leaves_once_used_or_not() {
                 }
             });
             // Another one tries meanwhile; it comes in only where the first one has left.
-            let came = Inside::for_operation(&*visited, false).map(|mut inside| inside.with(|_, n| *n += 1)).is_ok();
+            let came = GateGuard::for_operation(&*visited, false).map(|mut inside| inside.with(|_, n| *n += 1)).is_ok();
             working.join().unwrap();
             assert_eq!(visits(&visited), u32::from(used) + u32::from(came));
             assert!(!visited.0.is_busy());
@@ -133,14 +133,14 @@ fn a_right_that_is_sent_leaves_once_used_or_not() {
 fn what_returns_late_is_cleaned_up_once() {
     loom::model(|| {
         let visited = in_state(RunState::Stopped);
-        let inside = Inside::idle(&*visited, false, |_| true).unwrap().sent(&visited);
+        let inside = GateGuard::idle(&*visited, false, |_| true).unwrap().sent(&visited);
         let working = thread::spawn(move || inside.leave(None).quarantined);
         let given_up = visited.0.quarantine().is_some();
         let told_so = working.join().unwrap();
         assert_eq!(given_up, told_so);
         assert_eq!(visited.0.is_lost(), given_up);
-        assert_eq!(Inside::idle(&*visited, true, |_| true).is_err(), given_up, "nobody comes in any more");
-        assert!(Inside::returned(&*visited).is_some(), "but for who cleans up");
+        assert_eq!(GateGuard::idle(&*visited, true, |_| true).is_err(), given_up, "nobody comes in any more");
+        assert!(GateGuard::returned(&*visited).is_some(), "but for who cleans up");
     });
 }
 
@@ -149,6 +149,6 @@ fn what_returns_late_is_cleaned_up_once() {
 fn a_right_is_one_of_its_own_gate() {
     loom::model(|| {
         let (one, other) = (in_state(RunState::Stopped), in_state(RunState::Stopped));
-        let _ = Inside::idle(&*one, false, |_| true).unwrap().sent(&other);
+        let _ = GateGuard::idle(&*one, false, |_| true).unwrap().sent(&other);
     });
 }

@@ -4,7 +4,9 @@ use crate::helpers::shown;
 use davit::diagnostics::Language;
 use davit::lang::{self, LoadOptions, Sources, print};
 use davit::model::monitor::*;
-use davit::model::statechart::{Action, Connector, Node, Since, State, Statechart, Transition as Edge, Trigger};
+use davit::model::statechart::{
+    Action, ChartNode, ChartTransition as DiagramEdge, Connector, Since, State, Statechart, Trigger,
+};
 use davit::model::*;
 use proptest::collection::{btree_map, btree_set, vec};
 use proptest::option;
@@ -194,13 +196,22 @@ fn trigger() -> impl Strategy<Value = Trigger> {
     ]
 }
 
-fn edge() -> impl Strategy<Value = Edge> {
+fn edge() -> impl Strategy<Value = DiagramEdge> {
     let reference =
         || option::weighted(0.9, "\\.?[a-z]{1,4}(\\.[a-z]{1,4}){0,2}".prop_map(|text| (text, Origin::NONE)));
     let names = || vec(event().prop_map(|e| (Action::Raise(e), Origin::NONE)), 0..3);
     let triggers = vec(trigger().prop_map(|t| (t, Origin::NONE)), 0..3);
-    (reference(), reference(), triggers, names(), finite(), option::of(any_text()))
-        .prop_map(|(src, tgt, events, effect, pn, doc)| Edge { src, tgt, events, effect, pn, doc, ..Edge::default() })
+    (reference(), reference(), triggers, names(), finite(), option::of(any_text())).prop_map(
+        |(src, tgt, events, effect, pn, doc)| DiagramEdge {
+            src,
+            tgt,
+            events,
+            effect,
+            pn,
+            doc,
+            ..DiagramEdge::default()
+        },
+    )
 }
 
 fn state() -> impl Strategy<Value = State> {
@@ -218,8 +229,8 @@ fn state() -> impl Strategy<Value = State> {
     let body = body.boxed();
     body.clone().prop_recursive(3, 12, 4, move |inner| {
         let connector = (ident(), option::of(any_text()))
-            .prop_map(|(name, doc)| Node::Connector(Connector { doc, ..Connector::new(name) }));
-        let child = prop_oneof![3 => inner.prop_map(Node::State), 1 => connector];
+            .prop_map(|(name, doc)| ChartNode::Connector(Connector { doc, ..Connector::new(name) }));
+        let child = prop_oneof![3 => inner.prop_map(ChartNode::State), 1 => connector];
         (body.clone(), vec(child, 0..4)).prop_map(|(mut state, mut children)| {
             let reserved = ["entry", "exit", "doo", "config", "doc", "type", "new", "rfsm"];
             let mut seen: BTreeSet<&str> = reserved.into();
@@ -242,11 +253,11 @@ fn time_or_zero() -> impl Strategy<Value = Duration> {
 }
 
 fn port_signal() -> impl Strategy<Value = PortSignal> {
-    let part = prop_oneof![ident().prop_map(Part::Field), (0_usize..1000).prop_map(Part::Index)];
+    let part = prop_oneof![ident().prop_map(ValuePart::Field), (0_usize..1000).prop_map(ValuePart::Index)];
     (member(), vec(part, 0..3)).prop_map(|(member, path)| PortSignal { member, path })
 }
 
-fn signal() -> impl Strategy<Value = Signal> {
+fn signal() -> impl Strategy<Value = MonitoredSignal> {
     let counter = prop::sample::select(Counter::NAMES.to_vec()).prop_map(|(_, counter)| counter);
     let leaf = prop_oneof![
         3 => port_signal().prop_map(SignalKind::Port),
@@ -254,7 +265,7 @@ fn signal() -> impl Strategy<Value = Signal> {
         1 => (member(), time()).prop_map(|(port, over)| SignalKind::Rate { port, over }),
         1 => (ident(), counter).prop_map(|(activity, counter)| SignalKind::Activity { activity, counter }),
     ];
-    leaf.prop_map(Signal::new).prop_recursive(3, 8, 3, |inner| {
+    leaf.prop_map(MonitoredSignal::new).prop_recursive(3, 8, 3, |inner| {
         let list = || vec(inner.clone(), 1..4);
         prop_oneof![
             list().prop_map(SignalKind::Norm),
@@ -263,7 +274,7 @@ fn signal() -> impl Strategy<Value = Signal> {
             (inner.clone(), inner.clone()).prop_map(|(a, b)| SignalKind::Difference(a.into(), b.into())),
             inner.clone().prop_map(|s| SignalKind::Abs(s.into())),
         ]
-        .prop_map(Signal::new)
+        .prop_map(MonitoredSignal::new)
     })
 }
 
@@ -280,9 +291,9 @@ fn condition() -> impl Strategy<Value = Condition> {
             hysteresis: h.filter(|_| op.is_ordered()),
         }),
         1 => (member(), op(), finite()).prop_map(|(port, op, v)| K::Compare {
-            left: Signal::new(SignalKind::Age(port)),
+            left: MonitoredSignal::new(SignalKind::Age(port)),
             op,
-            right: Signal::new(SignalKind::Constant(v)),
+            right: MonitoredSignal::new(SignalKind::Constant(v)),
             hysteresis: None,
         }),
         1 => port_signal().prop_map(K::IsTrue),
@@ -468,7 +479,8 @@ fn deployment() -> impl Strategy<Value = Deployment> {
                 let mut taken = BTreeSet::new();
                 let made = |(at, (name, chart, up, failed, down)): (usize, (Option<Ident>, _, _, _, _))| {
                     // Only the first one can stand under `coordinator`.
-                    let written = if at == 0 && name.is_none() { Written::Alone } else { Written::Named };
+                    let written =
+                        if at == 0 && name.is_none() { CoordinatorNaming::Alone } else { CoordinatorNaming::Named };
                     let name = name.unwrap_or(names[0]);
                     taken.insert(name).then_some(Coordinator {
                         name,

@@ -97,7 +97,8 @@ impl Bench {
                 step::apply(&step, &mut self.model).expect("what is nobody else's");
                 step::apply(&step, &mut self.platform).expect("what is nobody else's");
             }
-            let can = Can { execution: &blocking, room: out.len() < 3, quarantined: &[], busy: &[] };
+            let room = out.len() < 3;
+            let can = Can { execution: &blocking, batches: &|_| false, room, quarantined: &[], busy: &[] };
             match machine.poll(&mut self.model, Time::default(), &can) {
                 Poll::Begin(steps) => out.extend(steps),
                 Poll::Cancel(_) => {}

@@ -5,7 +5,7 @@
 
 pub use crate::names::ident;
 use davit::model::*;
-use davit::plan::{Context, Plan, plan};
+use davit::plan::{Plan, PlanContext, plan};
 use davit::system::{System, View, step};
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -146,8 +146,8 @@ pub fn catalogue(genes: &[TypeGene], irreversible: bool) -> Arc<Catalogue> {
     Arc::new(catalogue)
 }
 
-pub fn context() -> Context {
-    Context { activities: BTreeSet::from([ident("fast"), ident("slow")]), ..Context::default() }
+pub fn context() -> PlanContext {
+    PlanContext { activities: BTreeSet::from([ident("fast"), ident("slow")]), ..PlanContext::default() }
 }
 
 /// Reads a gene against a system.

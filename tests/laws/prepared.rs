@@ -6,7 +6,7 @@ use crate::settings;
 use crate::stacks::Both;
 use davit::model::{ChangeKind, Configuration, MemberRef, Policy, RunState, StateList, Step, Target};
 use davit::plan::PlannedStep;
-use davit::stack::{Op, Planned, Requester, Resolved, Scope, Switch};
+use davit::stack::{Op, Planned, Requester, ResolvedStep, Scope, Switch};
 use davit::system::{System, View, step};
 use davit::time::Time;
 use proptest::prelude::*;
@@ -130,7 +130,7 @@ impl Twins {
         let steps = |list: &[PlannedStep]| list.iter().map(|s| (s.step.clone(), s.undo.clone())).collect::<Vec<_>>();
         prop_assert_eq!(steps(&list), steps(&planned.steps));
         for (nth, listed) in list.iter().enumerate() {
-            let Resolved { step, place, index, value } = switch.step(nth, undoing).expect("as many as planned");
+            let ResolvedStep { step, place, index, value } = switch.step(nth, undoing).expect("as many as planned");
             prop_assert_eq!(step, &listed.step);
             // What goes to the platform is a step of the universe, with the value replaced.
             let mut sent = universe[index].clone();

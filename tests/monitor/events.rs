@@ -3,7 +3,7 @@
 use crate::support::*;
 use davit::model::monitor::*;
 use davit::model::*;
-use davit::monitor::{Bank, Sample};
+use davit::monitor::{Bank, InputSample};
 use davit::time::Time;
 
 fn c(kind: ConditionKind) -> Condition {
@@ -197,12 +197,12 @@ fn no_number_makes_every_comparison_false() {
         );
         // The component is destroyed.
         let i = rig.input("A.x");
-        rig.samples[i] = Sample::default();
+        rig.samples[i] = InputSample::default();
         rig.step(3 * MS);
         assert_eq!((rig.bank.is_true(0), rig.bank.robustness(0)), nothing, "{op:?} of a port that is gone");
     }
     let mut rig = Rig::new(&[monitor(compare(
-        Signal::new(SignalKind::Max(vec![port("A.x"), port("A.y")])),
+        MonitoredSignal::new(SignalKind::Max(vec![port("A.x"), port("A.y")])),
         Comparison::Above,
         1.0,
     ))]);
@@ -252,7 +252,7 @@ fn a_monitor_at_a_rate_looks_at_its_ticks_only() {
 
 #[test]
 fn rates_count_samples_in_their_time() {
-    let rate = Signal::new(SignalKind::Rate { port: MemberRef::new("A.x").unwrap(), over: ms(100) });
+    let rate = MonitoredSignal::new(SignalKind::Rate { port: MemberRef::new("A.x").unwrap(), over: ms(100) });
     let mut rig = Rig::new(&[monitor(compare(rate, Comparison::Below, 25.0))]);
     rig.write("A.x", 0, 0.0);
     rig.step(0);
@@ -270,7 +270,7 @@ fn rates_count_samples_in_their_time() {
 fn states_faults_and_counters() {
     let arm = ComponentName::new("Arm").unwrap();
     let control = Ident::new("control").unwrap();
-    let overruns = Signal::new(SignalKind::Activity { activity: control, counter: Counter::Overruns });
+    let overruns = MonitoredSignal::new(SignalKind::Activity { activity: control, counter: Counter::Overruns });
     let all = [
         monitor(c(ConditionKind::InState { component: arm, state: RunState::Running })),
         monitor(c(ConditionKind::Faulted(arm))),
@@ -368,7 +368,8 @@ fn merging_shifts_the_ends_of_windows_by_a_bounded_time() {
 #[test]
 fn a_sample_rate_with_little_memory_counts_a_bounded_time_too_long() {
     let rate = |seconds: u64| {
-        let rate = Signal::new(SignalKind::Rate { port: MemberRef::new("A.x").unwrap(), over: ms(seconds * 1000) });
+        let rate =
+            MonitoredSignal::new(SignalKind::Rate { port: MemberRef::new("A.x").unwrap(), over: ms(seconds * 1000) });
         [monitor(compare(rate, Comparison::Above, 0.0))]
     };
     let big = |monitors: &[Monitor]| Rig::of(Bank::with_memory(monitors, 1 << 16));

@@ -38,8 +38,8 @@ impl History {
         t as i64 - newest as i64 * STEPS as i64
     }
 
-    fn number(&self, s: &Signal, t: usize) -> f64 {
-        let all = |list: &[Signal]| list.iter().map(|s| self.number(s, t)).collect::<Vec<_>>();
+    fn number(&self, s: &MonitoredSignal, t: usize) -> f64 {
+        let all = |list: &[MonitoredSignal]| list.iter().map(|s| self.number(s, t)).collect::<Vec<_>>();
         let pick = |list: Vec<f64>, f: fn(f64, f64) -> f64| {
             if list.iter().any(|v| v.is_nan()) { f64::NAN } else { list.into_iter().reduce(f).unwrap() }
         };

@@ -21,12 +21,12 @@ fn ns(range: std::ops::Range<u64>) -> impl Strategy<Value = Duration> {
     range.prop_map(Duration::from_nanos)
 }
 
-fn signal() -> impl Strategy<Value = Signal> {
+fn signal() -> impl Strategy<Value = MonitoredSignal> {
     let leaf = prop_oneof![
         5 => name().prop_map(port),
         1 => (-3..4_i32).prop_map(|v| constant(f64::from(v))),
         1 => (name(), ns(1..9)).prop_map(|(n, over)| {
-            Signal::new(SignalKind::Rate { port: MemberRef::new(n).unwrap(), over })
+            MonitoredSignal::new(SignalKind::Rate { port: MemberRef::new(n).unwrap(), over })
         }),
     ];
     leaf.prop_recursive(2, 4, 2, |inner| {
@@ -38,7 +38,7 @@ fn signal() -> impl Strategy<Value = Signal> {
             (inner.clone(), inner.clone()).prop_map(|(a, b)| SignalKind::Difference(a.into(), b.into())),
             inner.clone().prop_map(|s| SignalKind::Abs(s.into())),
         ]
-        .prop_map(Signal::new)
+        .prop_map(MonitoredSignal::new)
     })
 }
 
@@ -54,7 +54,7 @@ fn condition() -> impl Strategy<Value = Condition> {
             hysteresis: h.filter(|_| op.is_ordered()).map(f64::from),
         }),
         1 => (name(), op(), 0..7_u32).prop_map(|(n, op, v)| K::Compare {
-            left: Signal::new(SignalKind::Age(MemberRef::new(n).unwrap())),
+            left: MonitoredSignal::new(SignalKind::Age(MemberRef::new(n).unwrap())),
             op,
             right: constant(f64::from(v) * 1e-9),
             hysteresis: None,

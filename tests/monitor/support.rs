@@ -2,7 +2,7 @@
 
 use davit::model::monitor::*;
 use davit::model::*;
-use davit::monitor::{Bank, Input, Sample};
+use davit::monitor::{Bank, InputSample, MonitorInput};
 use davit::time::Time;
 use std::time::Duration;
 
@@ -12,15 +12,15 @@ pub fn ms(n: u64) -> Duration {
     Duration::from_millis(n)
 }
 
-pub fn port(text: &str) -> Signal {
-    Signal::new(SignalKind::Port(text.parse().unwrap()))
+pub fn port(text: &str) -> MonitoredSignal {
+    MonitoredSignal::new(SignalKind::Port(text.parse().unwrap()))
 }
 
-pub fn constant(v: f64) -> Signal {
-    Signal::new(SignalKind::Constant(v))
+pub fn constant(v: f64) -> MonitoredSignal {
+    MonitoredSignal::new(SignalKind::Constant(v))
 }
 
-pub fn compare(left: Signal, op: Comparison, right: f64) -> Condition {
+pub fn compare(left: MonitoredSignal, op: Comparison, right: f64) -> Condition {
     Condition::new(ConditionKind::Compare { left, op, right: constant(right), hysteresis: None })
 }
 
@@ -45,7 +45,7 @@ pub fn monitor(when: Condition) -> Monitor {
 /// A bank and what its inputs hold, by the text of the input.
 pub struct Rig {
     pub bank: Bank,
-    pub samples: Vec<Sample>,
+    pub samples: Vec<InputSample>,
     pub raised: Vec<(u64, usize, String)>,
 }
 
@@ -55,16 +55,16 @@ impl Rig {
     }
 
     pub fn of(bank: Bank) -> Self {
-        let samples = vec![Sample::default(); bank.inputs().len()];
+        let samples = vec![InputSample::default(); bank.inputs().len()];
         Self { bank, samples, raised: Vec::new() }
     }
 
     pub fn input(&self, text: &str) -> usize {
-        let name = |input: &Input| match input {
-            Input::Port(port) => port.to_string(),
-            Input::State(component) => format!("state {component}"),
-            Input::Faulted(component) => format!("faulted {component}"),
-            Input::Activity { activity, counter } => format!("{activity} {}", counter.word()),
+        let name = |input: &MonitorInput| match input {
+            MonitorInput::Port(port) => port.to_string(),
+            MonitorInput::State(component) => format!("state {component}"),
+            MonitorInput::Faulted(component) => format!("faulted {component}"),
+            MonitorInput::Activity { activity, counter } => format!("{activity} {}", counter.word()),
         };
         self.bank.inputs().iter().position(|i| name(i) == text).unwrap_or_else(|| panic!("no input {text}"))
     }
@@ -73,7 +73,7 @@ impl Rig {
     pub fn write(&mut self, text: &str, at: u64, value: f64) {
         let i = self.input(text);
         let sample = &mut self.samples[i];
-        *sample = Sample { value, at: Time(at), writes: sample.writes + 1, present: true };
+        *sample = InputSample { value, at: Time(at), writes: sample.writes + 1, present: true };
     }
 
     /// One step.

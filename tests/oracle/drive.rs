@@ -8,7 +8,7 @@ use crate::names::event;
 use crate::settings::{Setting, followed};
 use davit::check::{Follower, Known, Seen, Shown};
 use davit::model::{Ask, ConfigId, EventName};
-use davit::platform::simulated::{Delays, Fault, FaultRule, Faults, Options, Simulated, StepPattern};
+use davit::platform::simulated::{Delays, Fault, FaultRule, Faults, Simulated, SimulatedOptions, StepPattern};
 use davit::session::{Happening, Session, SessionSetup};
 use davit::stack::Requester;
 use davit::statechart::{Chart, compile};
@@ -102,7 +102,7 @@ pub fn run(seed: u64, made: &Made, chance: &mut Chance, classes: &mut Classes) -
     let Some(follower) = Follower::new(&followed, &lent, &made.catalogue) else { return Ok(false) };
     let clock = Clock::simulated();
     let me = clock.enter();
-    let options = Options { delays: delays(chance), ..Options::default() };
+    let options = SimulatedOptions { delays: delays(chance), ..SimulatedOptions::default() };
     let said = format!("{:?}", options.delays);
     let platform = Simulated::new(made.catalogue.clone(), clock.clone(), options);
     let session = Session::start(SessionSetup {

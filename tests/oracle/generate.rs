@@ -5,7 +5,7 @@
 
 use crate::names::{event, ident};
 use davit::model::finding::Origin;
-use davit::model::statechart::{Action, Node, State, Statechart, Transition, Trigger};
+use davit::model::statechart::{Action, ChartNode, ChartTransition, State, Statechart, Trigger};
 use davit::model::*;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -338,23 +338,23 @@ fn coordinator(
                     if chance.percent(40) {
                         inner.entry.push(raise(&raised(chance, configurations, several, kept)));
                     }
-                    state.children.push(Node::State(inner));
+                    state.children.push(ChartNode::State(inner));
                 }
-                state.transitions.push(Transition::new("initial", "in0", []));
-                state.transitions.push(Transition::new("in0", "in1", [trigger(chance.pick(&EVENTS))]));
-                state.transitions.push(Transition::new("in1", "in0", [trigger(chance.pick(&EVENTS))]));
+                state.transitions.push(ChartTransition::new("initial", "in0", []));
+                state.transitions.push(ChartTransition::new("in0", "in1", [trigger(chance.pick(&EVENTS))]));
+                state.transitions.push(ChartTransition::new("in1", "in0", [trigger(chance.pick(&EVENTS))]));
             }
         }
-        root.children.push(Node::State(state));
+        root.children.push(ChartNode::State(state));
     }
     if kept {
         let mut base = State::new(ident("base"));
         base.entry.push(raise("c3"));
-        root.children.push(Node::State(base));
+        root.children.push(ChartNode::State(base));
     }
-    root.transitions.push(Transition::new("initial", "idle", []));
+    root.transitions.push(ChartTransition::new("initial", "idle", []));
     let mut add = |src: &str, tgt: &str, events: Vec<Trigger>, effect: Vec<String>| {
-        let mut transition = Transition::new(src, tgt, events);
+        let mut transition = ChartTransition::new(src, tgt, events);
         transition.effect.extend(effect.iter().map(|name| raise(name)));
         root.transitions.push(transition);
     };
@@ -418,7 +418,7 @@ fn coordinator(
     told(&root, 1, text);
     Coordinator {
         name: ident(name),
-        written: Written::Named,
+        written: CoordinatorNaming::Named,
         chart: Statechart::new(root),
         up: "s1".to_owned(),
         failed: Vec::new(),
@@ -458,7 +458,7 @@ fn told(state: &State, depth: usize, text: &mut String) {
         );
     }
     for child in &state.children {
-        if let Node::State(child) = child {
+        if let ChartNode::State(child) = child {
             told(child, depth + 1, text);
         }
     }

@@ -2,8 +2,9 @@
 
 use crate::support::*;
 use davit::model::*;
-use davit::platform::{Cause, Outcome, Platform};
+use davit::platform::{Cause, Outcome, Platform, StepBatch, TimedStep};
 use davit::runtime::*;
+use davit::time::Time;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicI64, Ordering};
 use std::time::Duration;
@@ -18,28 +19,28 @@ struct Busy {
 impl Component for Busy {
     fn new(b: &mut Builder<Self>) -> Self {
         let shared = Arc::new(AtomicI64::new(0));
-        b.operation("add", |_, _, (a, b): (i64, i64)| Answer::Done(a + b));
-        b.operation("nothing", |_, _, (): ()| Answer::Done(()));
-        b.operation("fail", |_, _, (why,): (String,)| Answer::<()>::Failed(why));
-        b.operation("panic", |_, _, (): ()| -> Answer { panic!("on purpose") });
-        b.operation("hang", |_, cx, (): ()| -> Answer { cx.clock().hang() });
+        b.operation("add", |_, _, (a, b): (i64, i64)| OperationAnswer::Done(a + b));
+        b.operation("nothing", |_, _, (): ()| OperationAnswer::Done(()));
+        b.operation("fail", |_, _, (why,): (String,)| OperationAnswer::<()>::Failed(why));
+        b.operation("panic", |_, _, (): ()| -> OperationAnswer { panic!("on purpose") });
+        b.operation("hang", |_, cx, (): ()| -> OperationAnswer { cx.clock().hang() });
         b.operation("sleep", |_, cx, (ms,): (i64,)| {
             cx.clock().sleep(MS * u32::try_from(ms).unwrap());
-            Answer::Done(())
+            OperationAnswer::Done(())
         });
         b.operation("calibrate", |this: &mut Self, cx, (): ()| {
             this.calibration = Some((0, cx.ticket()));
-            Answer::<f64>::Pending
+            OperationAnswer::<f64>::Pending
         });
         b.operation("forget", |this: &mut Self, _, (): ()| {
             this.calibration = None;
-            Answer::Done(())
+            OperationAnswer::Done(())
         });
-        b.operation("careless", |_, _, (): ()| Answer::<()>::Pending);
-        b.caller_operation("count", move |(): ()| Answer::Done(shared.fetch_add(1, Ordering::SeqCst)));
+        b.operation("careless", |_, _, (): ()| OperationAnswer::<()>::Pending);
+        b.caller_operation("count", move |(): ()| OperationAnswer::Done(shared.fetch_add(1, Ordering::SeqCst)));
         b.caller_operation("sleep_beside", |(ms,): (u64,)| {
             // Beside the component; a test may not sleep, but it may take its time.
-            Answer::Done(ms)
+            OperationAnswer::Done(ms)
         });
         Self { calibration: None, ticks: b.property("ticks", 5), update_takes_ms: b.property("update_takes_ms", 0) }
     }
@@ -68,6 +69,31 @@ fn busy(activity: &str) -> Bench {
     let b = bench(library());
     b.create("c", "Busy", activity, &[]);
     b
+}
+
+/// The way to a worker and back is paid once for all of them.
+#[test]
+fn many_are_made_and_dropped_in_few_hand_overs() {
+    let b = bench(library());
+    let component = |i| name(&format!("c{i}"));
+    let create = |i| Step::Create {
+        component: component(i),
+        ty: TypeName::new("Busy").unwrap(),
+        activity: Some(ident("fast")),
+        properties: vec![Value::Int(5), Value::Int(0)],
+    };
+    let destroy = |i| Step::Destroy { component: component(i) };
+    for step in [&create as &dyn Fn(usize) -> Step, &destroy] {
+        let timed = |i| TimedStep { step: step(i), patience: MS, until: Time::NEVER };
+        let batch = StepBatch::new(b.clock.clone(), (0..200).map(timed).collect());
+        assert!(batch.steps().iter().all(|timed| b.platform.batches(&timed.step)));
+        let before = b.clock.hand_overs();
+        b.platform.execute_batch(&batch);
+        let hand_overs = b.clock.hand_overs() - before;
+        let answers = batch.take(true);
+        assert!(answers.len() == 200 && answers.iter().all(|it| it.outcome == Outcome::Done(None)), "{answers:?}");
+        assert!(hand_overs <= 5, "{hand_overs}");
+    }
 }
 
 #[test]

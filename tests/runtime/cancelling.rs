@@ -18,37 +18,37 @@ impl Component for Mover {
     fn new(b: &mut Builder<Self>) -> Self {
         b.operation("go", |this: &mut Self, cx, (): ()| {
             this.task = Some(cx.ticket());
-            Answer::<i64>::Pending
+            OperationAnswer::<i64>::Pending
         });
         b.operation("arrive", |this: &mut Self, _, (): ()| {
             if let Some(ticket) = this.task.take() {
                 ticket.done(this.moved);
             }
-            Answer::Done(())
+            OperationAnswer::Done(())
         });
         b.operation("grind", |this: &mut Self, cx, (ms,): (i64,)| {
             for _ in 0..ms {
                 if cx.is_cancelled() && !this.deaf.get() {
-                    return Answer::Done(this.moved);
+                    return OperationAnswer::Done(this.moved);
                 }
                 this.moved += 1;
                 cx.clock().sleep(MS);
             }
-            Answer::Done(-1)
+            OperationAnswer::Done(-1)
         });
-        b.operation("far", |this: &mut Self, _, (): ()| Answer::Done(this.moved));
+        b.operation("far", |this: &mut Self, _, (): ()| OperationAnswer::Done(this.moved));
         b.operation("note", |_, cx, (what,): (String,)| {
             log::note(cx.clock(), what);
-            Answer::Done(())
+            OperationAnswer::Done(())
         });
-        b.operation("hang", |_, cx, (): ()| -> Answer { cx.clock().hang() });
-        b.operation("fall", |_, cx, (): ()| -> Answer {
+        b.operation("hang", |_, cx, (): ()| -> OperationAnswer { cx.clock().hang() });
+        b.operation("fall", |_, cx, (): ()| -> OperationAnswer {
             while !cx.is_cancelled() {
                 cx.clock().sleep(MS);
             }
             panic!("on purpose")
         });
-        b.caller_operation("brake", |(): ()| Answer::Done(()));
+        b.caller_operation("brake", |(): ()| OperationAnswer::Done(()));
         Self { task: None, moved: 0, deaf: b.property("deaf", false) }
     }
 

@@ -43,7 +43,7 @@ fn signal(text: &str) -> PortSignal {
 }
 
 fn above(text: &str, limit: f64) -> Condition {
-    let side = |kind| Signal { kind, origin: Origin::NONE };
+    let side = |kind| MonitoredSignal { kind, origin: Origin::NONE };
     Condition::new(ConditionKind::Compare {
         left: side(SignalKind::Port(signal(text))),
         op: Comparison::Above,
@@ -200,7 +200,7 @@ fn an_in_port_is_seen_through_its_connection() {
 
 #[test]
 fn counters_of_activities_are_seen() {
-    let side = |kind| Signal { kind, origin: Origin::NONE };
+    let side = |kind| MonitoredSignal { kind, origin: Origin::NONE };
     let counted = Condition::new(ConditionKind::Compare {
         left: side(SignalKind::Activity { activity: ident("slow"), counter: Counter::Cycles }),
         op: Comparison::AtLeast,

@@ -3,7 +3,7 @@
 use super::life::checked;
 use davit::app;
 use davit::platform::Platform;
-use davit::platform::simulated::{Fault, FaultRule, Faults, Options, Simulated};
+use davit::platform::simulated::{Fault, FaultRule, Faults, Simulated, SimulatedOptions};
 use davit::session::{NotUp, Phase};
 use davit::time::Clock;
 use std::sync::Arc;
@@ -23,8 +23,11 @@ fn bring_up(nth: u64, fault: Fault) -> Option<End> {
     let clock = Clock::simulated();
     let _me = clock.enter();
     let faults = Faults::new([FaultRule::nth(nth, fault)]);
-    let platform =
-        Arc::new(Simulated::new(checked.catalogue.clone(), clock.clone(), Options { faults, ..Options::default() }));
+    let platform = Arc::new(Simulated::new(
+        checked.catalogue.clone(),
+        clock.clone(),
+        SimulatedOptions { faults, ..SimulatedOptions::default() },
+    ));
     let session = app::start_on(&checked, platform.clone(), &clock);
     let not_up = session.bring_up().err();
     if not_up.is_none() {

@@ -3,12 +3,12 @@
 
 use crate::names::event;
 use davit::app;
-use davit::coordinator::Refused;
+use davit::coordinator::NotAccepted;
 use davit::lang::LoadOptions;
 use davit::libraries;
 use davit::limits;
 use davit::model::{Ask, ComponentName};
-use davit::platform::simulated::{Options, Simulated};
+use davit::platform::simulated::{Simulated, SimulatedOptions};
 use davit::session::{Happening, NotRaised, Session, SessionSetup};
 use davit::statechart::compile;
 use davit::time::Clock;
@@ -80,7 +80,7 @@ impl Crowd {
         let read = app::read(&folder.path().join("d.yaml"), &LoadOptions::default(), libraries::builtin());
         let read = read.unwrap_or_else(|refused| panic!("{:#?}", refused.findings));
         let clock = Clock::real();
-        let platform = Simulated::new(read.catalogue.clone(), clock.clone(), Options::default());
+        let platform = Simulated::new(read.catalogue.clone(), clock.clone(), SimulatedOptions::default());
         let charts = read.deployment.charts().map(|written| Arc::new(compile(written).0.expect("a chart"))).collect();
         let session = Session::start(SessionSetup {
             deployment: Arc::new(read.deployment.clone()),
@@ -210,7 +210,7 @@ fn a_flood_from_outside_is_refused_and_displaces_no_answer_and_no_shutdown() {
         let crowd = crowd.clone();
         std::thread::spawn(move || {
             let sent = (0..EACH).map(|_| crowd.session.offer(event("e_click"), "test"));
-            let refused = sent.filter(|sent| *sent == Err(Refused::Full.into())).count();
+            let refused = sent.filter(|sent| *sent == Err(NotAccepted::Full.into())).count();
             EACH - refused
         })
     };

@@ -5,7 +5,7 @@ use davit::app;
 use davit::lang::LoadOptions;
 use davit::model::EventName;
 use davit::platform::Platform as _;
-use davit::runtime::{Answer, Builder, Component, Kind, Libraries, Library, Prop};
+use davit::runtime::{Builder, Component, ComponentFactory, Libraries, Library, OperationAnswer, Prop};
 use davit::session::{Happening, NotUp, Phase, Session};
 use davit::time::Clock;
 use std::sync::{Arc, Mutex};
@@ -26,14 +26,14 @@ fn hang(clock: &Clock, wanted: &str, here: &str) {
 }
 
 impl Sluggish {
-    fn kind(clock: &Clock) -> Kind {
+    fn kind(clock: &Clock) -> ComponentFactory {
         let clock = clock.clone();
-        Kind::made_by("Sluggish", move |b: &mut Builder<Self>| {
+        ComponentFactory::made_by("Sluggish", move |b: &mut Builder<Self>| {
             let own = clock.clone();
             let mut hangs = b.property("hangs", String::new());
             b.caller_operation("beside", move |(how,): (String,)| {
                 hang(&own, &how, "beside");
-                Answer::Done(())
+                OperationAnswer::Done(())
             });
             hang(&clock, &hangs.get(), "made");
             Self { clock: clock.clone(), hangs }

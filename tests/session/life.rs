@@ -1,6 +1,6 @@
 //! The story of a deployment in simulated time, on both platforms.
 
-use davit::app::script::{self, Interrupt, Options};
+use davit::app::script::{self, Interrupt, ScriptOptions};
 use davit::app::{self, Checked};
 use davit::lang::LoadOptions;
 use davit::libraries;
@@ -116,7 +116,7 @@ fn runs(story: &str) {
     let clock = Clock::simulated();
     let end = script::run(
         &path,
-        Options {
+        ScriptOptions {
             clock: clock.clone(),
             extensions: libraries::builtin().into(),
             load: LoadOptions::default(),
@@ -142,7 +142,7 @@ fn run_text(text: &str) -> (Option<String>, Option<bool>) {
     let clock = Clock::simulated();
     let end = script::run(
         &path,
-        Options {
+        ScriptOptions {
             clock: clock.clone(),
             extensions: libraries::builtin().into(),
             load: LoadOptions::default(),

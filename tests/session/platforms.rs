@@ -1,10 +1,10 @@
 //! A platform that a program brings itself: named like a built-in one, given its options, and what may be wrong with them.
 
-use davit::app::{self, Extensions, PlatformMaker};
+use davit::app::{self, Extensions, PlatformMaker, StartError};
 use davit::lang::LoadOptions;
 use davit::libraries;
-use davit::model::{PlatformKind, Value, ValueType};
-use davit::platform::simulated::{Options, Simulated};
+use davit::model::{Catalogue, PlatformKind, Value, ValueType};
+use davit::platform::simulated::{Simulated, SimulatedOptions};
 use davit::session::Phase;
 use davit::time::Clock;
 use std::sync::{Arc, Mutex};
@@ -16,12 +16,21 @@ fn program(made: &Made) -> Extensions {
     let made = made.clone();
     let bus = PlatformMaker::new("bus", PlatformKind::ELSEWHERE, move |making| {
         made.lock().unwrap().push(format!("{:?}", making.options));
-        match making.options.values().any(|value| *value == Value::Str("gone".into())) {
-            true => Err("no such device".to_owned()),
-            false => {
-                Ok(Arc::new(Simulated::new(making.checked.catalogue.clone(), making.clock.clone(), Options::default())))
-            }
+        let device = |name: &str| making.options.values().any(|value| *value == Value::Str(name.into()));
+        if device("gone") {
+            return Err("no such device".to_owned());
         }
+        let mut types = Catalogue::new();
+        for ty in making.checked.catalogue.iter().filter(|_| !device("empty")) {
+            let mut own = (**ty).clone();
+            // What is said of it in other words makes no difference.
+            for level in own.properties.values_mut().filter(|_| device("dim")) {
+                level.max = Some(0.5);
+                level.doc = "half as bright".to_owned();
+            }
+            types.insert(own);
+        }
+        Ok(Arc::new(Simulated::new(types, making.clock.clone(), SimulatedOptions::default())))
     })
     .option("device", ValueType::Str, None, "the device file")
     .option("rate", ValueType::Float, Some(Value::Int(50)), "how often it is read, in Hz");
@@ -102,4 +111,21 @@ fn what_is_wrong_with_a_platform_is_told() {
     let checked = read("{ bus: { device: gone } }", &made).unwrap_or_else(|why| panic!("{why:?}"));
     let refused = app::start(&checked, &Clock::simulated()).err().map(|error| error.to_string());
     assert_eq!(refused.as_deref(), Some("the platform `bus` cannot be made: no such device"));
+}
+
+/// What `check` accepted could fail there: nothing of it is begun.
+#[test]
+fn a_platform_whose_types_are_others_is_not_deployed_to() {
+    for (device, told) in [
+        ("empty", "the platform `bus` has no type `Lamp`"),
+        ("dim", "`Lamp.level`: max is declared as 1, the platform has 0.5"),
+    ] {
+        let checked = read(&format!("{{ bus: {{ device: {device} }} }}"), &Made::default())
+            .unwrap_or_else(|why| panic!("{why:?}"));
+        let refused = app::start(&checked, &Clock::simulated()).err();
+        let Some(StartError::Types { findings, .. }) = &refused else { panic!("{device}: {refused:?}") };
+        assert_eq!(findings.iter().map(|f| f.message.as_str()).collect::<Vec<_>>(), [told], "{device}");
+        assert!(findings[0].origin.is_some() && findings[0].code == davit::model::codes::TYPE_DIFFERS, "{findings:?}");
+        assert!(refused.unwrap().to_string().contains(told));
+    }
 }

@@ -6,7 +6,7 @@ use davit::lang::LoadOptions;
 use davit::model::{Ask, ConfigId, Snapshot};
 use davit::platform::Platform;
 use davit::platform::embedded::EmbeddedPlatform;
-use davit::platform::simulated::{Fault, FaultRule, Faults, Options, Simulated};
+use davit::platform::simulated::{Fault, FaultRule, Faults, Simulated, SimulatedOptions};
 use davit::runtime::{Builder, Component, Context, Failure, In, Libraries, Library, Out, Prop};
 use davit::session::Session;
 use davit::time::Clock;
@@ -140,7 +140,7 @@ impl Swapped {
             .unwrap_or_else(|refused| panic!("{:#?}", refused.findings));
         let embedded = EmbeddedPlatform::new(&clock, &checked.libraries, &checked.deployment.activities);
         let simulated = (platform == "simulated")
-            .then(|| Arc::new(Simulated::new(checked.catalogue.clone(), clock.clone(), Options::default())));
+            .then(|| Arc::new(Simulated::new(checked.catalogue.clone(), clock.clone(), SimulatedOptions::default())));
         let platform: Arc<dyn Platform> = match &simulated {
             Some(simulated) => simulated.clone(),
             None => Arc::new(embedded),

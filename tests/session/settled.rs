@@ -4,10 +4,10 @@ use davit::app;
 use davit::lang::LoadOptions;
 use davit::model::monitor::{Condition, ConditionKind};
 use davit::model::{Ask, Catalogue, ComponentName, ComponentSnapshot, ConfigId, Execution, Outcome, Snapshot, Step};
-use davit::monitor::Input;
+use davit::monitor::MonitorInput;
 use davit::platform::embedded::EmbeddedPlatform;
 use davit::platform::{Cause, EventSink, ObserveError, Platform, Watch};
-use davit::runtime::{Answer, Builder, Component, Context, Libraries, Library, Out};
+use davit::runtime::{Builder, Component, Context, Libraries, Library, OperationAnswer, Out};
 use davit::session::Session;
 use davit::time::{Clock, Signal, Time};
 use std::sync::{Arc, Mutex};
@@ -24,11 +24,11 @@ impl Component for Gripper {
         let closed = Condition::new(ConditionKind::IsTrue("self.closed".parse().unwrap()));
         b.settled_by(closed).undone_by("open").operation("close", |gripper: &mut Self, _, (): ()| {
             gripper.closed = true;
-            Answer::Done(())
+            OperationAnswer::Done(())
         });
         b.undone_by("close").operation("open", |gripper: &mut Self, _, (): ()| {
             gripper.closed = false;
-            Answer::Done(())
+            OperationAnswer::Done(())
         });
         Self { closed: false, shows: b.output("closed") }
     }
@@ -84,7 +84,7 @@ impl Platform for Lossy {
     ) -> Result<Option<ComponentSnapshot>, ObserveError> {
         self.inner.observe_component(component, deadline)
     }
-    fn watch(&self, inputs: &[Input], wake: &Signal) -> Option<Box<dyn Watch>> {
+    fn watch(&self, inputs: &[MonitorInput], wake: &Signal) -> Option<Box<dyn Watch>> {
         if *self.lost.lock().unwrap() == Some(Lost::Sight) { None } else { self.inner.watch(inputs, wake) }
     }
     fn subscribe(&self, sink: EventSink) {

@@ -7,8 +7,8 @@ use davit::lang::LoadOptions;
 use davit::libraries;
 use davit::model::{Ask, ComponentName, RequestId, Step, Value, codes};
 use davit::platform::Platform as _;
-use davit::platform::simulated::{Options, Simulated};
-use davit::runtime::{Answer, Builder, Component, Context, Kind, Libraries, Library, Out, Prop};
+use davit::platform::simulated::{Simulated, SimulatedOptions};
+use davit::runtime::{Builder, Component, ComponentFactory, Context, Libraries, Library, OperationAnswer, Out, Prop};
 use davit::session::{Happening, Phase, Session};
 use davit::time::{Clock, Time};
 use std::sync::atomic::{AtomicI64, Ordering};
@@ -42,13 +42,13 @@ impl Component for Drive {
     }
 }
 
-fn kind(limit: &Arc<AtomicI64>, clock: &Clock) -> Kind {
+fn kind(limit: &Arc<AtomicI64>, clock: &Clock) -> ComponentFactory {
     let (limit, clock) = (limit.clone(), clock.clone());
-    Kind::made_by("Drive", move |b: &mut Builder<Drive>| {
+    ComponentFactory::made_by("Drive", move |b: &mut Builder<Drive>| {
         let clock = clock.clone();
         b.caller_operation("settle", move |(): ()| {
             clock.sleep(100 * MS);
-            Answer::Done(())
+            OperationAnswer::Done(())
         });
         Drive { limit: limit.clone(), wanted: b.property("wanted", 0.0), mode: b.output("mode"), now: 0.0 }
     })
@@ -316,7 +316,7 @@ fn where_no_values_can_be_seen_only_a_fault_speaks_against_it() {
         .unwrap_or_else(|refused| panic!("{:#?}", refused.findings));
     let warned = checked.findings.iter().filter(|finding| finding.code == codes::CONF_HOLDS_UNSEEN).count();
     assert_eq!(warned, 3, "`check` says so of each: {:?}", checked.findings);
-    let platform = Simulated::new(checked.catalogue.clone(), clock.clone(), Options::default());
+    let platform = Simulated::new(checked.catalogue.clone(), clock.clone(), SimulatedOptions::default());
     let session = app::start_on(&checked, Arc::new(platform.clone()), &clock);
     let run = Run { heard: record(&session), clock: clock.clone(), session, limit: Arc::default() };
     run.session.bring_up().unwrap();
@@ -342,7 +342,7 @@ fn what_a_later_look_finds_different_is_lost_too_and_looking_keeps_no_clock_goin
     let checked = app::read(&folder.path().join("d.yaml"), &LoadOptions::default(), libraries::builtin())
         .and_then(app::check)
         .unwrap_or_else(|refused| panic!("{:#?}", refused.findings));
-    let platform = Simulated::new(checked.catalogue.clone(), clock.clone(), Options::default());
+    let platform = Simulated::new(checked.catalogue.clone(), clock.clone(), SimulatedOptions::default());
     let session = app::start_on(&checked, Arc::new(platform.clone()), &clock);
     let run = Run { heard: record(&session), clock: clock.clone(), session, limit: Arc::default() };
     run.session.bring_up().unwrap();

@@ -6,7 +6,7 @@ use davit::lang::LoadOptions;
 use davit::libraries;
 use davit::model::{Ask, ConfigId, RunState};
 use davit::platform::Platform;
-use davit::platform::simulated::{Delays, Fault, FaultRule, Faults, Options, Simulated, StepPattern};
+use davit::platform::simulated::{Delays, Fault, FaultRule, Faults, Simulated, SimulatedOptions, StepPattern};
 use davit::session::service::SessionService;
 use davit::session::socket::Service;
 use davit::session::{Command, Ended, Happening, Phase, Session, Stage, rpc};
@@ -109,7 +109,8 @@ impl Small {
         let two = |step: &str| (StepPattern::new(step), Duration::from_secs(2));
         let delays =
             Delays { of: vec![two("operation_call a.raise"), two("operation_call a.lower")], ..Delays::default() };
-        let options = Options { faults: Faults::new(faults), delays, blocking: true, ..Options::default() };
+        let options =
+            SimulatedOptions { faults: Faults::new(faults), delays, blocking: true, ..SimulatedOptions::default() };
         let platform = Simulated::new(checked.catalogue.clone(), clock.clone(), options);
         platform.record();
         let session = app::start_on(&checked, wrap(platform.clone()), &clock);

@@ -2,7 +2,9 @@
 
 use crate::names::event;
 use crate::support::*;
-use davit::coordinator::{ChartTrouble, Class, Coordinator, Core, Delivered, Incoming, Listener, Refused, Tag};
+use davit::coordinator::{
+    ChartTrouble, Class, CoordinatorHandle, Core, Delivered, Incoming, Listener, NotAccepted, Tag,
+};
 use davit::limits;
 use davit::model::names::EventName;
 use davit::statechart::{Chart, Hook, NodeId, Raised};
@@ -182,7 +184,7 @@ fn it_runs_on_its_own_thread_and_is_woken_by_events_and_by_time() {
     ]));
     let (on, off) = (chart.find("on").unwrap(), chart.find("root.off").unwrap());
     let log = Log::default();
-    let coordinator = Coordinator::start("coordinator", chart, &clock, log.clone());
+    let coordinator = CoordinatorHandle::start("coordinator", chart, &clock, log.clone());
     clock.sleep(Duration::from_millis(1));
     coordinator.deliver(Incoming::new(Class::Outside, event("e_on"))).unwrap();
     let entered = clock.now();
@@ -202,12 +204,12 @@ fn detached_it_raises_nothing_more() {
     let _guard = clock.enter();
     let chart = Arc::new(compiled(vec![s("a", vec![Part::Entry("raised")]), t("initial", "a", ""), t("a", "a", "e")]));
     let log = Log::default();
-    let coordinator = Coordinator::start("coordinator", chart, &clock, log.clone());
+    let coordinator = CoordinatorHandle::start("coordinator", chart, &clock, log.clone());
     clock.sleep(Duration::from_millis(1));
     log.take();
     coordinator.deliver(Incoming::new(Class::Outside, event("e"))).unwrap();
     coordinator.detach();
-    assert_eq!(coordinator.deliver(Incoming::new(Class::Outside, event("e"))), Err(Refused::Detached));
+    assert_eq!(coordinator.deliver(Incoming::new(Class::Outside, event("e"))), Err(NotAccepted::Detached));
     clock.sleep(Duration::from_secs(1));
     assert!(log.take().is_empty(), "the event was in the inbox, and nobody commands any more");
     assert_eq!(coordinator.active(), ["root", "root.a"], "the last state stays readable");
@@ -227,7 +229,7 @@ fn a_flood_of_reports_does_not_displace_what_is_urgent() {
     ]));
     let run = chart.find("run").unwrap();
     let log = Log::default();
-    let coordinator = Coordinator::start("coordinator", chart, &clock, log.clone());
+    let coordinator = CoordinatorHandle::start("coordinator", chart, &clock, log.clone());
     clock.sleep(Duration::from_millis(1));
     assert!(coordinator.is_active(run));
     // This thread holds the token of the simulated clock: all of this waits in the inbox before anything is looked at.
@@ -246,7 +248,7 @@ fn a_flood_of_reports_does_not_displace_what_is_urgent() {
 
 #[test]
 fn a_listener_may_end_it_from_inside() {
-    struct Once(Arc<Mutex<Option<Coordinator>>>, Log);
+    struct Once(Arc<Mutex<Option<CoordinatorHandle>>>, Log);
     impl Listener for Once {
         fn raised(&mut self, _: &Chart, batch: &[Raised]) {
             self.1.add(format!("{} names", batch.len()));
@@ -259,7 +261,7 @@ fn a_listener_may_end_it_from_inside() {
     let _guard = clock.enter();
     let chart = Arc::new(compiled(vec![s("a", vec![]), t("initial", "a", ""), tx("a", "a", "e", 0.0, "x")]));
     let (slot, log) = (Arc::new(Mutex::new(None)), Log::default());
-    let coordinator = Coordinator::start("coordinator", chart.clone(), &clock, Once(slot.clone(), log.clone()));
+    let coordinator = CoordinatorHandle::start("coordinator", chart.clone(), &clock, Once(slot.clone(), log.clone()));
     *slot.lock().unwrap() = Some(coordinator.clone());
     clock.sleep(Duration::from_millis(1));
     coordinator.deliver(Incoming::new(Class::Outside, event("e"))).unwrap();
@@ -274,7 +276,7 @@ fn when_it_rests_it_is_seen_to_rest() {
     // Whoever looked while an event was being reacted to, and saw no rest, is told when to look again: also after an
     // event that moves nothing.
     struct Rests {
-        coordinator: Arc<OnceLock<Coordinator>>,
+        coordinator: Arc<OnceLock<CoordinatorHandle>>,
         seen: Arc<Mutex<Vec<bool>>>,
     }
     impl Listener for Rests {
@@ -292,7 +294,7 @@ fn when_it_rests_it_is_seen_to_rest() {
     let _guard = clock.enter();
     let (own, seen) = (Arc::new(OnceLock::new()), Arc::new(Mutex::new(Vec::new())));
     let listener = Rests { coordinator: own.clone(), seen: seen.clone() };
-    let coordinator = Coordinator::start("coordinator", Arc::new(copying()), &clock, listener);
+    let coordinator = CoordinatorHandle::start("coordinator", Arc::new(copying()), &clock, listener);
     own.set(coordinator.clone()).unwrap();
     clock.sleep(Duration::from_millis(1));
     seen.lock().unwrap().clear();
@@ -317,7 +319,7 @@ fn it_is_detached_though_a_function_of_its_model_hangs() {
     let _guard = clock.enter();
     let (log, own) = (Log::default(), clock.clone());
     let coordinator =
-        Coordinator::start_with("coordinator", Arc::new(copying()), &clock, log.clone(), move || Ok(Slow(own)));
+        CoordinatorHandle::start_with("coordinator", Arc::new(copying()), &clock, log.clone(), move || Ok(Slow(own)));
     coordinator.deliver(Incoming::new(Class::Outside, event("e_aligned"))).unwrap();
     clock.sleep(Duration::from_millis(1));
     let asked = clock.now();

@@ -2,7 +2,7 @@
 //! lists searched from end to end, the tree of all paths built every time. It shares no code with the engine. Functions of
 //! a model are small programs here, which `rich.rs` writes down in Lua for the engine.
 
-use davit::model::statechart::{Action, Node, Since, State, Statechart, Trigger};
+use davit::model::statechart::{Action, ChartNode, Since, State, Statechart, Trigger};
 use davit::statechart::Mode;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -199,8 +199,8 @@ impl Naive {
         for child in &state.children {
             let name = format!("{fqn}.{}", child.name());
             match child {
-                Node::State(inner) => self.nodes(inner, &name),
-                Node::Connector(_) => {
+                ChartNode::State(inner) => self.nodes(inner, &name),
+                ChartNode::Connector(_) => {
                     self.connectors.insert(name);
                 }
             }
@@ -259,7 +259,7 @@ impl Naive {
             self.outgoing.entry(src).or_default().push(trans);
         }
         for child in &state.children {
-            if let Node::State(inner) = child {
+            if let ChartNode::State(inner) = child {
                 self.transitions(inner, &format!("{fqn}.{}", inner.name), numbers)?;
             }
         }
@@ -464,7 +464,7 @@ impl Naive {
         matches!(answer, Answer::Yes | Answer::Error) && self.queue.is_empty()
     }
 
-    /// `step(fsm, n)`; none: more than so many turns.
+    /// `step(fsm, n)`; none: more than so many microsteps.
     pub fn step(&mut self, mut n: u64, events: &[&str], mut turns: u64) -> Option<bool> {
         self.queue.extend(events.iter().map(|e| (*e).to_owned()));
         self.actions.clear();

@@ -4,7 +4,7 @@ use crate::naive::Naive;
 use crate::support::raise;
 use davit::model::finding::Origin;
 use davit::model::names::{ConfigId, EventName, Ident};
-use davit::model::statechart::{Connector, Node, State, Statechart, Transition, Trigger};
+use davit::model::statechart::{ChartNode, ChartTransition, Connector, State, Statechart, Trigger};
 use davit::statechart::{AtOnce, Chart, EventId, Hook, Machine, Raised, RunEnd, Sim, Stepped, compile};
 use davit::time::Time;
 use proptest::prelude::*;
@@ -50,13 +50,13 @@ fn tree(choices: &mut Choices<'_>, name: &str, fqn: &str, depth: usize, all: &mu
     };
     for name in NAMES.iter().take(children) {
         let inner = tree(choices, name, &format!("{fqn}.{name}"), depth + 1, all);
-        state.children.push(Node::State(inner));
+        state.children.push(ChartNode::State(inner));
     }
     if children > 0 {
         for number in 0..choices.below(3) {
             let name = format!("k{number}");
             all.push((format!("{fqn}.{name}"), false));
-            state.children.push(Node::Connector(Connector::new(Ident::new(&name).unwrap())));
+            state.children.push(ChartNode::Connector(Connector::new(Ident::new(&name).unwrap())));
         }
     }
     state
@@ -93,7 +93,7 @@ fn written(choices: &mut Choices<'_>, scope: &str, fqn: &str) -> String {
 fn transitions(choices: &mut Choices<'_>, state: &mut State, fqn: &str, all: &[(String, bool)]) {
     let add = |choices: &mut Choices<'_>, state: &mut State, src: String, tgt: &str, events: Vec<Trigger>| {
         let tgt = written(choices, fqn, tgt);
-        let mut transition = Transition::new(&src, &tgt, events);
+        let mut transition = ChartTransition::new(&src, &tgt, events);
         transition.pn = [0.0, 0.0, 0.0, 1.0, -1.0, 2.0][choices.below(6)];
         if choices.below(2) == 1 {
             transition.effect.push(raise(&format!("ef{}", choices.below(9))));
@@ -124,11 +124,11 @@ fn transitions(choices: &mut Choices<'_>, state: &mut State, fqn: &str, all: &[(
         let (source, target) = (choices.of(&nodes).to_owned(), choices.of(&nodes).to_owned());
         for number in 0..2 * davit::limits::CHART_WIDE {
             let trigger = Trigger::parse(&format!("e_pad{number}")).unwrap();
-            state.transitions.push(Transition::new(&source, &target, [trigger]));
+            state.transitions.push(ChartTransition::new(&source, &target, [trigger]));
         }
     }
     for child in &mut state.children {
-        if let Node::State(inner) = child {
+        if let ChartNode::State(inner) = child {
             let name = format!("{fqn}.{}", inner.name);
             transitions(choices, inner, &name, all);
         }
@@ -148,7 +148,7 @@ pub fn chart(bytes: &[u8]) -> Statechart {
 struct Names(Vec<Raised>);
 
 impl Hook for Names {
-    const TURNS: bool = false;
+    const MICROSTEPS: bool = false;
     const WATCHES: bool = false;
 
     fn raised(&mut self, _: &Chart, raised: Raised) {
@@ -161,7 +161,7 @@ impl Hook for Names {
 struct Watched(Vec<Raised>);
 
 impl Hook for Watched {
-    const TURNS: bool = false;
+    const MICROSTEPS: bool = false;
 
     fn raised(&mut self, _: &Chart, raised: Raised) {
         self.0.push(raised);

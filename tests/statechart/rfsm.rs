@@ -309,7 +309,7 @@ mod doo {
             t("a", "b", "e_stop"),
             t("b", "a", "e_again"),
         ]);
-        let davit::model::statechart::Node::State(a) = &mut model.root.children[0] else { panic!("a state") };
+        let davit::model::statechart::ChartNode::State(a) = &mut model.root.children[0] else { panic!("a state") };
         a.doo = function(1);
         Run::of(&model, hook)
     }

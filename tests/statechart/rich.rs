@@ -6,7 +6,7 @@ use crate::naive::{Answer, Naive, Program, Rich};
 use crate::random::{EVENTS, chart};
 use davit::functions::Opener;
 use davit::lang::{LoadOptions, Sources, load_coordinator};
-use davit::model::statechart::{Action, Node, State, Statechart, Trigger};
+use davit::model::statechart::{Action, ChartNode, State, Statechart, Trigger};
 use davit::statechart::{Sim, compile};
 use proptest::prelude::*;
 use std::cell::Cell;
@@ -84,7 +84,7 @@ impl Maker<'_> {
             }
         }
         for child in &state.children {
-            if let Node::State(inner) = child {
+            if let ChartNode::State(inner) = child {
                 self.state(inner, &format!("{fqn}.{}", inner.name));
             }
         }
@@ -211,8 +211,8 @@ fn lua(model: &Statechart, rich: &Rich) -> String {
         for child in &state_.children {
             let _ = write!(out, "{} = ", child.name());
             match child {
-                Node::State(inner) => state(out, inner, &format!("{fqn}.{}", inner.name), rich, transitions),
-                Node::Connector(_) => out.push_str("rfsm.conn {}"),
+                ChartNode::State(inner) => state(out, inner, &format!("{fqn}.{}", inner.name), rich, transitions),
+                ChartNode::Connector(_) => out.push_str("rfsm.conn {}"),
             }
             out.push_str(",\n");
         }

@@ -4,13 +4,14 @@ use davit::model::finding::Origin;
 use davit::model::names::EventName;
 use davit::model::statechart::{Action, FunctionId, Statechart};
 use davit::statechart::{
-    ActionPlace, Chart, Doo, EdgeId, EventId, Hook, Machine, NodeId, Queue, Raised, TurnResult, View, compile,
+    ActionPlace, Chart, Doo, EdgeId, EventId, Hook, HookContext, Machine, MicrostepResult, NodeId, Queue, Raised,
+    compile,
 };
 use davit::time::Time;
 use std::collections::{BTreeMap, VecDeque};
 
 /// A function of a model: says what to answer, may send events.
-type Body = Box<dyn FnMut(&mut View<'_>) -> i32>;
+type Body = Box<dyn FnMut(&mut HookContext<'_>) -> i32>;
 
 /// Calls the functions by number and notes everything.
 #[derive(Default)]
@@ -33,7 +34,7 @@ pub const FINISHED: i32 = 2;
 pub const FAILED: i32 = 3;
 
 impl Scripted {
-    pub fn function(mut self, id: u32, body: impl FnMut(&mut View<'_>) -> i32 + 'static) -> Self {
+    pub fn function(mut self, id: u32, body: impl FnMut(&mut HookContext<'_>) -> i32 + 'static) -> Self {
         self.functions.insert(id, Box::new(body));
         self
     }
@@ -43,7 +44,7 @@ impl Scripted {
         std::mem::take(&mut self.log).join(" ")
     }
 
-    fn call(&mut self, id: FunctionId, view: &mut View<'_>) -> i32 {
+    fn call(&mut self, id: FunctionId, view: &mut HookContext<'_>) -> i32 {
         self.functions.get_mut(&id.0).map_or(0, |body| body(view))
     }
 }
@@ -71,22 +72,22 @@ impl Hook for Scripted {
         true
     }
 
-    fn before_step(&mut self, view: &mut View<'_>, _: &mut Vec<EventId>) -> bool {
+    fn before_step(&mut self, view: &mut HookContext<'_>, _: &mut Vec<EventId>) -> bool {
         self.sets.push(view.events.iter().map(|e| view.chart.event_text(*e)).collect());
         true
     }
 
-    fn guard(&mut self, function: FunctionId, _: EdgeId, view: &mut View<'_>) -> bool {
+    fn guard(&mut self, function: FunctionId, _: EdgeId, view: &mut HookContext<'_>) -> bool {
         self.log.push(format!("g{}", function.0));
         self.call(function, view) != 0
     }
 
-    fn predicate(&mut self, function: FunctionId, event: EventId, view: &mut View<'_>) -> bool {
+    fn predicate(&mut self, function: FunctionId, event: EventId, view: &mut HookContext<'_>) -> bool {
         self.log.push(format!("p{}({})", function.0, view.chart.event_text(event)));
         self.call(function, view) != 0
     }
 
-    fn action(&mut self, function: FunctionId, place: ActionPlace, view: &mut View<'_>) {
+    fn action(&mut self, function: FunctionId, place: ActionPlace, view: &mut HookContext<'_>) {
         let active = self.path.last().map_or("none".to_owned(), |n| view.chart.name(*n).to_string());
         let leaf = view.leaf.map_or("none".to_owned(), |n| view.chart.name(n).to_string());
         let place = match place {
@@ -102,7 +103,7 @@ impl Hook for Scripted {
         self.log.push(format!("reset{}", state.index()));
     }
 
-    fn doo(&mut self, function: FunctionId, _: NodeId, view: &mut View<'_>) -> Doo {
+    fn doo(&mut self, function: FunctionId, _: NodeId, view: &mut HookContext<'_>) -> Doo {
         self.log.push(format!("doo{}", function.0));
         match self.call(function, view) {
             BUSY => Doo::Yielded { idle: false },
@@ -165,8 +166,8 @@ impl Run {
         self.machine.run(&self.chart, Time(0), &mut self.hook).idle
     }
 
-    pub fn turn(&mut self) -> TurnResult {
-        self.machine.turn(&self.chart, Time(0), &mut self.hook)
+    pub fn microstep(&mut self) -> MicrostepResult {
+        self.machine.microstep(&self.chart, Time(0), &mut self.hook)
     }
 
     pub fn leaf(&self) -> String {

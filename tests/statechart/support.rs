@@ -2,13 +2,13 @@
 
 use davit::model::finding::{Finding, Origin};
 use davit::model::names::{ConfigId, EventName, Ident};
-use davit::model::statechart::{Action, Connector, Node, State, Statechart, Transition, Trigger};
+use davit::model::statechart::{Action, ChartNode, ChartTransition, Connector, State, Statechart, Trigger};
 use davit::statechart::{Chart, Observation, Sim, compile};
 
 /// A piece of a state.
 pub enum Part {
-    Child(Node),
-    Trans(Transition),
+    Child(ChartNode),
+    Trans(ChartTransition),
     Entry(&'static str),
     Exit(&'static str),
     Config(&'static str),
@@ -34,12 +34,12 @@ pub fn raise(name: &str) -> (Action, Origin) {
 
 /// A child state.
 pub fn s(name: &str, parts: Vec<Part>) -> Part {
-    Part::Child(Node::State(state(name, parts)))
+    Part::Child(ChartNode::State(state(name, parts)))
 }
 
 /// A child connector.
 pub fn c(name: &str) -> Part {
-    Part::Child(Node::Connector(Connector::new(Ident::new(name).unwrap())))
+    Part::Child(ChartNode::Connector(Connector::new(Ident::new(name).unwrap())))
 }
 
 /// A transition on any of the events, separated by blanks; none: on any event.
@@ -55,8 +55,8 @@ pub fn tx(src: &str, tgt: &str, events: &str, pn: f64, effect: &str) -> Part {
     Part::Trans(t)
 }
 
-pub fn transition(src: &str, tgt: &str, events: &str) -> Transition {
-    Transition::new(src, tgt, events.split_whitespace().map(|e| Trigger::parse(e).unwrap()))
+pub fn transition(src: &str, tgt: &str, events: &str) -> ChartTransition {
+    ChartTransition::new(src, tgt, events.split_whitespace().map(|e| Trigger::parse(e).unwrap()))
 }
 
 pub fn root(parts: Vec<Part>) -> Statechart {

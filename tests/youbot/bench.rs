@@ -5,7 +5,7 @@ use davit::libraries::youbot::components::samples::{JointState, Odometry, ToolPo
 use davit::model::{
     Call, ComponentName, ConfigId, Deployment, Ident, MemberRef, Policy, RunState, Step, Transition, TypeName, Value,
 };
-use davit::plan::{Context as PlanContext, plan};
+use davit::plan::{PlanContext, plan};
 use davit::platform::embedded::EmbeddedPlatform;
 use davit::platform::{Outcome, Platform, PlatformEvent};
 use davit::runtime::{Builder, Component, Context, In, Libraries, Library, Prop};
@@ -60,7 +60,7 @@ impl Component for Probe {
         });
         b.no_effect().operation("read", |c, _, (): ()| {
             c.hand_over();
-            davit::runtime::Answer::Done(())
+            davit::runtime::OperationAnswer::Done(())
         });
         Self {
             tool: b.input("tool"),

@@ -6,7 +6,7 @@ use super::files::deployment;
 use davit::limits;
 use davit::model::ChangeKind;
 use davit::model::monitor::{MONITORS_TYPE, SignalKind};
-use davit::monitor::{Bank, Input, Sample};
+use davit::monitor::{Bank, InputSample, MonitorInput};
 use davit::time::Time;
 use std::collections::BTreeMap;
 
@@ -39,15 +39,15 @@ fn a_second_of_the_worst_chatter_fits_the_coordinators_inbox() {
             }
         });
         let mut bank = Bank::new(&deployment.monitors);
-        let ports: Vec<bool> = bank.inputs().iter().map(|input| matches!(input, Input::Port(_))).collect();
-        let mut samples = vec![Sample::default(); ports.len()];
+        let ports: Vec<bool> = bank.inputs().iter().map(|input| matches!(input, MonitorInput::Port(_))).collect();
+        let mut samples = vec![InputSample::default(); ports.len()];
         for ms in 1..=SECONDS * 1000 {
             let now = Time(ms * 1_000_000);
             for (sample, is_port) in samples.iter_mut().zip(&ports) {
                 // Now and then nothing comes: silence and age are conditions too.
                 if *is_port && random(10) > 0 {
                     let (value, writes) = (values[random(values.len())], sample.writes + 1);
-                    *sample = Sample { value, at: now, writes, present: true };
+                    *sample = InputSample { value, at: now, writes, present: true };
                 }
             }
             if ms % round == 0 {

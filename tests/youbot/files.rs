@@ -3,7 +3,7 @@
 use davit::lang::{LoadOptions, load};
 use davit::libraries::{builtin, monitors};
 use davit::model::{Catalogue, ConfigId, Deployment, EventName};
-use davit::plan::{Context, irreversible, plan};
+use davit::plan::{PlanContext, irreversible, plan};
 use davit::system::System;
 use davit::system::step::apply;
 use std::path::Path;
@@ -57,7 +57,7 @@ pub fn deployment(name: &str) -> (Deployment, Arc<Catalogue>) {
 }
 
 fn go(system: &mut System, deployment: &Deployment, ids: &[&str]) {
-    let context = Context { activities: deployment.activities.keys().copied().collect(), ..Default::default() };
+    let context = PlanContext { activities: deployment.activities.keys().copied().collect(), ..Default::default() };
     for id in ids {
         let configuration = deployment.configuration(ConfigId::new(id).unwrap()).unwrap_or_else(|| panic!("no {id}"));
         let plan = plan(system, configuration, &context).unwrap_or_else(|r| panic!("{id}: {:?}", r.findings));

@@ -32,7 +32,7 @@ use serde::Serialize;
 pub enum Class {
     /// Goes before everything else. One that waits already is this one, too.
     Urgent,
-    /// An answer; its room is [held](super::Coordinator::hold) since it was asked for.
+    /// An answer; its room is [held](super::CoordinatorHandle::hold) since it was asked for.
     Answer,
     /// What the configurator says unasked. One that waits already gives way to this one: the last word counts.
     Notice,
@@ -85,7 +85,7 @@ impl Incoming {
 
 /// Why an event was not accepted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum Refused {
+pub enum NotAccepted {
     /// There is no room for it; that was counted.
     #[error("the coordinator does not keep up: no room for another event")]
     Full,
@@ -206,16 +206,16 @@ impl Inbox {
     }
 
     /// Takes room for one event of a class that has to have it before it comes; all others have it always.
-    pub fn hold(&mut self, class: Class) -> Result<(), Refused> {
+    pub fn hold(&mut self, class: Class) -> Result<(), NotAccepted> {
         match class {
             Class::Answer if self.answers + self.held.answers < self.bounds.answers => self.held.answers += 1,
             Class::Outside if self.lists.len(List::Outside) + self.held.outside < self.bounds.outside => {
                 self.held.outside += 1;
             }
-            Class::Answer => return Err(Refused::Full),
+            Class::Answer => return Err(NotAccepted::Full),
             Class::Outside => {
                 self.dropped.outside += 1;
-                return Err(Refused::Full);
+                return Err(NotAccepted::Full);
             }
             Class::Urgent | Class::Notice | Class::Report => {}
         }
@@ -232,7 +232,7 @@ impl Inbox {
     }
 
     /// Puts an event in; an answer, or one from outside, into the room that was held for it (if none was, there must be some).
-    pub fn push(&mut self, incoming: Incoming) -> Result<Put, Refused> {
+    pub fn push(&mut self, incoming: Incoming) -> Result<Put, NotAccepted> {
         match incoming.class {
             Class::Urgent => return self.push_urgent(incoming),
             Class::Notice => return Ok(self.push_notice(incoming)),
@@ -256,7 +256,7 @@ impl Inbox {
         Ok(Put::Waits)
     }
 
-    fn push_urgent(&mut self, incoming: Incoming) -> Result<Put, Refused> {
+    fn push_urgent(&mut self, incoming: Incoming) -> Result<Put, NotAccepted> {
         let single = (List::Urgent, incoming.event, None);
         let Some(at) = self.singles.get(&single).copied() else {
             let at = self.lists.push(List::Urgent, incoming);
@@ -278,7 +278,7 @@ impl Inbox {
             ticket if self.joined.len() < self.bounds.joined => self.joined.push((incoming.event, ticket)),
             _ => {
                 self.dropped.outside += 1;
-                return Err(Refused::Full);
+                return Err(NotAccepted::Full);
             }
         }
         Ok(Put::Joined)
@@ -292,7 +292,7 @@ impl Inbox {
         if before.is_some() { Put::Joined } else { Put::Waits }
     }
 
-    fn push_report(&mut self, incoming: Incoming) -> Result<Put, Refused> {
+    fn push_report(&mut self, incoming: Incoming) -> Result<Put, NotAccepted> {
         let full = self.lists.len(List::Reports) >= self.bounds.report;
         let newest = self.newest.get_mut(&incoming.event);
         let put = match newest.as_deref() {
@@ -305,7 +305,7 @@ impl Inbox {
             }
             None => {
                 self.dropped.report += 1;
-                return Err(Refused::Full);
+                return Err(NotAccepted::Full);
             }
         };
         let at = self.lists.push(List::Reports, incoming);
@@ -318,7 +318,7 @@ impl Inbox {
     /// The next event. Its tickets are put into `tickets`.
     pub fn pop(&mut self, tickets: &mut Vec<u64>) -> Option<Incoming> {
         tickets.clear();
-        let list = self.turn()?;
+        let list = self.next_list()?;
         let (at, incoming) = self.lists.pop(list)?;
         match incoming.class {
             Class::Urgent => {
@@ -340,7 +340,7 @@ impl Inbox {
     }
 
     /// Which list goes next; none: nothing waits.
-    fn turn(&mut self) -> Option<List> {
+    fn next_list(&mut self) -> Option<List> {
         let waits = |list| !self.lists.is_empty(list);
         let low = waits(List::Reports) || self.takes_from_outside();
         let (urgent, words) = (waits(List::Urgent), waits(List::Words));

@@ -85,10 +85,10 @@ impl Plain {
         }
     }
 
-    fn hold(&mut self, class: Class) -> Result<(), Refused> {
+    fn hold(&mut self, class: Class) -> Result<(), NotAccepted> {
         if !self.has_room(class) {
             self.refused += u64::from(class == Class::Outside);
-            return Err(Refused::Full);
+            return Err(NotAccepted::Full);
         }
         match class {
             Class::Answer => self.answers += 1,
@@ -113,7 +113,7 @@ impl Plain {
         list.push(Waits { incoming, tickets, since, ahead: list.len() });
     }
 
-    fn push(&mut self, incoming: Incoming) -> Result<Put, Refused> {
+    fn push(&mut self, incoming: Incoming) -> Result<Put, NotAccepted> {
         let like = |waits: &Waits| waits.incoming.class == incoming.class && waits.incoming.event == incoming.event;
         match incoming.class {
             Class::Urgent => {
@@ -121,7 +121,7 @@ impl Plain {
                 if let Some(waits) = self.of(List::Urgent).iter_mut().find(|waits| like(waits)) {
                     if incoming.ticket != 0 && !waits.tickets.is_empty() && joined >= SMALL.joined {
                         self.refused += 1;
-                        return Err(Refused::Full);
+                        return Err(NotAccepted::Full);
                     }
                     waits.tickets.extend(Some(incoming.ticket).filter(|t| *t != 0));
                     return Ok(Put::Joined);
@@ -141,7 +141,7 @@ impl Plain {
                 self.lost += 1;
                 let newest = self.of(List::Reports).iter().rposition(like);
                 match newest {
-                    _ if (0..DECLARED).all(|number| name(number) != incoming.event) => return Err(Refused::Full),
+                    _ if (0..DECLARED).all(|number| name(number) != incoming.event) => return Err(NotAccepted::Full),
                     Some(before) => _ = self.of(List::Reports).remove(before),
                     None => self.lost -= 1,
                 }
@@ -150,13 +150,13 @@ impl Plain {
             }
             Class::Report => {}
             Class::Answer => match self.answers {
-                0 if !self.has_room(Class::Answer) => return Err(Refused::Full),
+                0 if !self.has_room(Class::Answer) => return Err(NotAccepted::Full),
                 _ => self.release(Class::Answer),
             },
             Class::Outside => match self.outside {
                 0 if !self.has_room(Class::Outside) => {
                     self.refused += 1;
-                    return Err(Refused::Full);
+                    return Err(NotAccepted::Full);
                 }
                 _ => self.release(Class::Outside),
             },

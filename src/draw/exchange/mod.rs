@@ -9,14 +9,14 @@ pub use plantuml::coordinator_plantuml;
 #[cfg(test)]
 mod tests {
     use crate::model::names::{ConfigId, EventName, Ident};
-    use crate::model::statechart::{Action, Connector, Node, State, Statechart, Transition, Trigger};
+    use crate::model::statechart::{Action, ChartNode, ChartTransition, Connector, State, Statechart, Trigger};
 
     fn raise(name: &str) -> (Action, crate::model::Origin) {
         (Action::Raise(EventName::new(name).unwrap()), Default::default())
     }
 
-    fn trans(src: &str, tgt: &str, events: &[&str]) -> Transition {
-        Transition::new(src, tgt, events.iter().map(|e| Trigger::parse(e).unwrap()))
+    fn trans(src: &str, tgt: &str, events: &[&str]) -> ChartTransition {
+        ChartTransition::new(src, tgt, events.iter().map(|e| Trigger::parse(e).unwrap()))
     }
 
     /// One of everything.
@@ -25,15 +25,15 @@ mod tests {
         let (mut low, mut on, mut root) = (state("low"), state("on"), state("root"));
         low.entry.push(raise("e_low"));
         on.config.push((ConfigId::new("power").unwrap(), Default::default()));
-        on.children = vec![Node::State(low), Node::State(state("high"))];
+        on.children = vec![ChartNode::State(low), ChartNode::State(state("high"))];
         on.transitions = vec![trans("initial", "low", &[]), trans("low", "high", &["e_done", "e_after(1)"])];
         let mut go = trans("idle", "fork", &["e_go"]);
         go.pn = 2.0;
         go.effect.push(raise("e_gone"));
         root.children = vec![
-            Node::State(state("idle")),
-            Node::State(on),
-            Node::Connector(Connector::new(Ident::new("fork").unwrap())),
+            ChartNode::State(state("idle")),
+            ChartNode::State(on),
+            ChartNode::Connector(Connector::new(Ident::new("fork").unwrap())),
         ];
         root.transitions =
             vec![trans("initial", "idle", &[]), go, trans("fork", "on", &[]), trans("on", "initial", &["e_again"])];

@@ -3,7 +3,7 @@
 //! `[*]`, and going to it is going to the state around it.
 
 use crate::model::Statechart;
-use crate::model::outline::{Link, Outline};
+use crate::model::outline::{Outline, OutlineTransition};
 use crate::model::statechart::{Action, INITIAL, State};
 use std::fmt::Write as _;
 
@@ -72,7 +72,7 @@ fn level(out: &mut String, outline: &Outline<'_>, at: usize, depth: usize, activ
 }
 
 /// The state in whose block a transition is written: the source's parent.
-fn block(outline: &Outline<'_>, link: &Link<'_>) -> usize {
+fn block(outline: &Outline<'_>, link: &OutlineTransition<'_>) -> usize {
     outline.items[link.src].parent.unwrap_or(0)
 }
 
@@ -102,7 +102,7 @@ fn lines(state: &State) -> Vec<String> {
 }
 
 /// Events without what follows `@`, a priority, and what is raised.
-fn label(link: &Link<'_>) -> String {
+fn label(link: &OutlineTransition<'_>) -> String {
     let transition = link.transition;
     let events: Vec<String> = transition.events.iter().map(|(trigger, _)| trigger.to_string()).collect();
     let events: Vec<&str> = events.iter().map(|e| e.split('@').next().unwrap_or(e)).collect();

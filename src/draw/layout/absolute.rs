@@ -1,6 +1,6 @@
-//! From coordinates relative to each level to those of the picture.
+//! From coordinates relative to each level to those of the diagram.
 
-use super::super::picture::{Direction, Shape};
+use super::super::diagram::{RankDirection, Shape};
 use super::level::{LaidBox, Levels, slot_of};
 use super::{LineRun, Rect, Route};
 
@@ -13,7 +13,7 @@ impl Levels<'_> {
             parts.sort_by_key(|(stage, _)| *stage);
             route.runs = parts.into_iter().flat_map(|(_, runs)| runs).collect();
         }
-        for (route, edge) in routes.iter_mut().zip(&self.picture.edges) {
+        for (route, edge) in routes.iter_mut().zip(&self.diagram.edges) {
             if route.looped.is_some() {
                 route.looped = Some(nodes[edge.from]);
             }
@@ -28,14 +28,14 @@ impl Levels<'_> {
         routes: &mut [Route],
         parts: &mut [Vec<(i64, Vec<LineRun>)>],
     ) {
-        let rect = |s: &LaidBox| match self.picture.direction {
-            Direction::Right => Rect { x: s.along + along, y: s.across + across, w: s.len, h: s.wide },
-            Direction::Down => Rect { x: s.across + across, y: s.along + along, w: s.wide, h: s.len },
+        let rect = |s: &LaidBox| match self.diagram.direction {
+            RankDirection::Right => Rect { x: s.along + along, y: s.across + across, w: s.len, h: s.wide },
+            RankDirection::Down => Rect { x: s.across + across, y: s.along + along, w: s.wide, h: s.len },
         };
         let laid = &self.laid[slot_of(level)];
         for (node, slot) in &laid.items {
             nodes[*node] = rect(slot);
-            if self.picture.nodes[*node].shape == Shape::Group && !self.children[node + 1].is_empty() {
+            if self.diagram.nodes[*node].shape == Shape::Group && !self.children[node + 1].is_empty() {
                 self.write_level(Some(*node), (along + slot.along, across + slot.across), nodes, routes, parts);
             }
         }

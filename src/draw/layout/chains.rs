@@ -1,6 +1,6 @@
 //! The edges of a level as chains of places, one in each layer they pass.
 
-use super::super::picture::{Direction, Picture};
+use super::super::diagram::{Diagram, RankDirection};
 use super::label_size;
 use std::collections::BTreeMap;
 
@@ -58,7 +58,7 @@ impl Layered {
     /// From the items' vertices and ranks, the edges between items (edge, item, item) and those to the outside. Items
     /// stand in the even layers from 2 on; labels in the odd ones.
     pub(super) fn new(
-        picture: &Picture,
+        diagram: &Diagram,
         mut vertices: Vec<Vertex>,
         rank: &[usize],
         inner: &[(usize, usize, usize)],
@@ -80,7 +80,7 @@ impl Layered {
             vertices.len() - 1
         };
         for &(e, a, b) in inner {
-            let edge = &picture.edges[e];
+            let edge = &diagram.edges[e];
             let backwards = rank[a] > rank[b] || a == b;
             let (upper, lower) = if backwards { (b, a) } else { (a, b) };
             let turning = backwards && edge.from_port.is_some();
@@ -139,7 +139,7 @@ impl Layered {
         }
         // A label stands where its edge passes between two ranks, in the middle of its way.
         for chain in &mut chains {
-            let lines = &picture.edges[chain.edge].label;
+            let lines = &diagram.edges[chain.edge].label;
             let carries = chain.label.take().is_some() || (!chain.starts_at_border && !chain.ends_at_border);
             if lines.is_empty() || !carries {
                 continue;
@@ -148,9 +148,9 @@ impl Layered {
                 chain.vertices.iter().copied().filter(|v| *v >= items && vertices[*v].layer % 2 == 1).collect();
             if let Some(&v) = between.get(between.len() / 2) {
                 let (w, h) = label_size(lines);
-                let (len, wide) = match picture.direction {
-                    Direction::Right => (w, h),
-                    Direction::Down => (h, w),
+                let (len, wide) = match diagram.direction {
+                    RankDirection::Right => (w, h),
+                    RankDirection::Down => (h, w),
                 };
                 vertices[v] = Vertex { len: len + 6.0, wide, ..vertices[v] };
                 chain.label = Some(v);

@@ -4,7 +4,7 @@ use super::chains::Chain;
 use super::level::{EdgePart, Laid, LaidBox};
 use super::meeting::{ChainEnds, EdgeMeeting};
 use super::{LineRun, label_size};
-use crate::draw::picture::Direction;
+use crate::draw::diagram::RankDirection;
 use std::collections::BTreeMap;
 
 /// A level in which everything has its place.
@@ -25,13 +25,13 @@ pub(super) struct Laying<'a> {
 impl Laying<'_> {
     /// The places of the items.
     pub(super) fn items(&self) -> Vec<(usize, LaidBox)> {
-        let EdgeMeeting { picture, items, own, layered, .. } = self.meeting;
+        let EdgeMeeting { diagram, items, own, layered, .. } = self.meeting;
         let slot = |(i, node): (usize, &usize)| {
             let v = layered.vertices[i];
-            let along = match picture.direction {
+            let along = match diagram.direction {
                 // In the middle of a rank of states; columns of components begin at one line.
-                Direction::Down => f64::midpoint(self.start[v.layer], self.end[v.layer]) - own[i].len / 2.0,
-                Direction::Right => self.start[v.layer],
+                RankDirection::Down => f64::midpoint(self.start[v.layer], self.end[v.layer]) - own[i].len / 2.0,
+                RankDirection::Right => self.start[v.layer],
             };
             let across = self.middles[i] - v.wide / 2.0 + self.offset;
             (*node, LaidBox { along, across, len: own[i].len, wide: own[i].wide })
@@ -120,16 +120,18 @@ pub(super) fn add_loops(meeting: &EdgeMeeting<'_>, loops: &[(usize, usize)], lai
     let mut taken: BTreeMap<usize, f64> = BTreeMap::new();
     for &(edge, node) in loops {
         let (_, slot) = *laid.items.iter().find(|(item, _)| *item == node).expect("a loop of an item");
-        let (w, h) = label_size(&meeting.picture.edges[edge].label);
+        let (w, h) = label_size(&meeting.diagram.edges[edge].label);
         let taken = taken.entry(node).or_insert(24.0);
-        let label = match meeting.picture.direction {
-            Direction::Down => LaidBox {
+        let label = match meeting.diagram.direction {
+            RankDirection::Down => LaidBox {
                 along: slot.along + slot.len / 2.0 - h / 2.0,
                 across: slot.across + slot.wide + *taken,
                 len: h,
                 wide: w,
             },
-            Direction::Right => LaidBox { along: slot.along + slot.len + *taken, across: slot.across, len: w, wide: h },
+            RankDirection::Right => {
+                LaidBox { along: slot.along + slot.len + *taken, across: slot.across, len: w, wide: h }
+            }
         };
         *taken += w + 6.0;
         laid.parts.push(EdgePart { edge, stage: 0, runs: Vec::new(), label: Some(label), looped: Some(node) });

@@ -1,11 +1,11 @@
-//! One level: the children of a group (or of the picture) and the parts of edges that run between them.
+//! One level: the children of a group (or of the diagram) and the parts of edges that run between them.
 
 use super::chains::{Border, Layered, Side, Vertex, spans};
 use super::laying::{Laying, add_loops};
 use super::meeting::EdgeMeeting;
 use super::rank::ranks;
 use super::{LineRun, header, label_size, text_size};
-use crate::draw::picture::{Direction, Picture, Shape, Subject};
+use crate::draw::diagram::{Diagram, RankDirection, Shape, Subject};
 use std::collections::BTreeMap;
 
 /// The place of an item in its level: its start and its extent, along and across.
@@ -35,10 +35,10 @@ pub(super) struct Laid {
     pub(super) parts: Vec<EdgePart>,
 }
 
-/// All levels of a picture.
+/// All levels of a diagram.
 pub(super) struct Levels<'a> {
-    pub(super) picture: &'a Picture,
-    /// Of each group, at its index + 1; of the picture at 0.
+    pub(super) diagram: &'a Diagram,
+    /// Of each group, at its index + 1; of the diagram at 0.
     pub(super) children: Vec<Vec<usize>>,
     edges: Vec<Vec<usize>>,
     depth: Vec<i64>,
@@ -60,22 +60,22 @@ pub(super) fn slot_of(level: Option<usize>) -> usize {
 }
 
 impl<'a> Levels<'a> {
-    pub(super) fn new(picture: &'a Picture) -> Self {
-        let count = picture.nodes.len();
+    pub(super) fn new(diagram: &'a Diagram) -> Self {
+        let count = diagram.nodes.len();
         let mut children = vec![Vec::new(); count + 1];
         let mut depth = vec![0; count + 1];
-        for (i, node) in picture.nodes.iter().enumerate() {
+        for (i, node) in diagram.nodes.iter().enumerate() {
             children[slot_of(node.parent)].push(i);
             depth[i + 1] = depth[slot_of(node.parent)] + 1;
         }
         let mut levels = Self {
-            picture,
+            diagram,
             children,
             edges: vec![Vec::new(); count + 1],
             depth,
             laid: (0..=count).map(|_| Laid::default()).collect(),
         };
-        for (i, edge) in picture.edges.iter().enumerate() {
+        for (i, edge) in diagram.edges.iter().enumerate() {
             let level = levels.common(edge.from, edge.to);
             levels.edges[slot_of(level)].push(i);
         }
@@ -85,15 +85,15 @@ impl<'a> Levels<'a> {
     /// The innermost level that holds both ends; of a group and something in it, the group's own.
     fn common(&self, a: usize, b: usize) -> Option<usize> {
         if a == b {
-            return self.picture.nodes[a].parent;
+            return self.diagram.nodes[a].parent;
         }
         let mut a = Some(a);
         let mut b = Some(b);
         while a != b {
             if self.depth[slot_of(a)] >= self.depth[slot_of(b)] {
-                a = self.picture.nodes[a.expect("deeper than the top")].parent;
+                a = self.diagram.nodes[a.expect("deeper than the top")].parent;
             } else {
-                b = self.picture.nodes[b.expect("deeper than the top")].parent;
+                b = self.diagram.nodes[b.expect("deeper than the top")].parent;
             }
         }
         a
@@ -106,7 +106,7 @@ impl<'a> Levels<'a> {
             if Some(at) == level {
                 return None;
             }
-            let parent = self.picture.nodes[at].parent;
+            let parent = self.diagram.nodes[at].parent;
             if parent == level {
                 return Some(at);
             }
@@ -126,15 +126,15 @@ impl<'a> Levels<'a> {
         level: Option<usize>,
         borders: &[Border],
     ) -> ((f64, f64), BTreeMap<(usize, bool), f64>) {
-        let picture = self.picture;
+        let diagram = self.diagram;
         let items = self.children[slot_of(level)].clone();
         let index: BTreeMap<usize, usize> = items.iter().enumerate().map(|(i, n)| (*n, i)).collect();
         let edges = self.edges_of(level, &index, borders);
         let rank = self.ranks_of(level, items.len(), &edges);
         let (own, ports) = self.boxes(&items, &rank, &edges);
-        let vertices = with_loops(picture, &own, &edges.loops, &index);
-        let layered = Layered::new(picture, vertices, &rank, &edges.inner, &edges.borders, &index);
-        let mut meeting = EdgeMeeting { picture, items: &items, own: &own, ports: &ports, layered };
+        let vertices = with_loops(diagram, &own, &edges.loops, &index);
+        let layered = Layered::new(diagram, vertices, &rank, &edges.inner, &edges.borders, &index);
+        let mut meeting = EdgeMeeting { diagram, items: &items, own: &own, ports: &ports, layered };
         meeting.put_in_order();
         let ends = meeting.ends();
         let middles = meeting.middles(&ends);
@@ -148,14 +148,14 @@ impl<'a> Levels<'a> {
         let mut offset = pads.2 - low;
         if let Some(group) = level {
             // Its title has room.
-            let wanted = text_size(picture, group).0;
-            match picture.direction {
-                Direction::Down if size.1 < wanted => {
+            let wanted = text_size(diagram, group).0;
+            match diagram.direction {
+                RankDirection::Down if size.1 < wanted => {
                     offset += (wanted - size.1) / 2.0;
                     size.1 = wanted;
                 }
-                Direction::Right => size.0 = size.0.max(wanted),
-                Direction::Down => {}
+                RankDirection::Right => size.0 = size.0.max(wanted),
+                RankDirection::Down => {}
             }
         }
 
@@ -181,7 +181,7 @@ impl<'a> Levels<'a> {
     fn edges_of(&self, level: Option<usize>, index: &BTreeMap<usize, usize>, borders: &[Border]) -> LevelEdges {
         let mut edges = LevelEdges { inner: Vec::new(), loops: Vec::new(), borders: borders.to_vec() };
         for &e in &self.edges[slot_of(level)] {
-            let edge = &self.picture.edges[e];
+            let edge = &self.diagram.edges[e];
             let border = |item: usize, side: Side| {
                 let outgoing = side == Side::End;
                 Border { edge: e, item, side, outgoing, stage: 0, labelled: true }
@@ -200,7 +200,7 @@ impl<'a> Levels<'a> {
     /// The ranks of the items.
     fn ranks_of(&self, level: Option<usize>, count: usize, edges: &LevelEdges) -> Vec<usize> {
         // Plans without arrows between them stand one below the other, as they are read.
-        if level.is_none() && self.picture.subject == Subject::Plan && edges.inner.is_empty() {
+        if level.is_none() && self.diagram.subject == Subject::Plan && edges.inner.is_empty() {
             return vec![0; count];
         }
         ranks(count, &edges.inner.iter().map(|(_, a, b)| (*a, *b)).collect::<Vec<_>>())
@@ -213,16 +213,16 @@ impl<'a> Levels<'a> {
         rank: &[usize],
         edges: &LevelEdges,
     ) -> (Vec<Vertex>, Vec<BTreeMap<(usize, bool), f64>>) {
-        let picture = self.picture;
+        let diagram = self.diagram;
         let mut boxes: Vec<Vertex> = Vec::with_capacity(items.len());
         let mut ports: Vec<BTreeMap<(usize, bool), f64>> = vec![BTreeMap::new(); items.len()];
         for (i, &node) in items.iter().enumerate() {
-            let (w, h) = text_size(picture, node);
-            let (mut len, mut wide) = match picture.direction {
-                Direction::Right => (w, h),
-                Direction::Down => (h, w),
+            let (w, h) = text_size(diagram, node);
+            let (mut len, mut wide) = match diagram.direction {
+                RankDirection::Right => (w, h),
+                RankDirection::Down => (h, w),
             };
-            if picture.nodes[node].shape == Shape::Group && !self.children[node + 1].is_empty() {
+            if diagram.nodes[node].shape == Shape::Group && !self.children[node + 1].is_empty() {
                 let crossing = self.crossing(i, node, rank, edges);
                 ((len, wide), ports[i]) = self.lay_with_ports(Some(node), &crossing);
             }
@@ -238,7 +238,7 @@ impl<'a> Levels<'a> {
         let inside = |deep: usize| self.item_in(Some(node), deep).expect("inside the group");
         let mut crossing: Vec<Border> = Vec::new();
         for &(e, a, b) in &edges.inner {
-            let edge = &self.picture.edges[e];
+            let edge = &self.diagram.edges[e];
             for (end, outgoing, deep) in [(a, true, edge.from), (b, false, edge.to)] {
                 if end == i && deep != node {
                     let other = if outgoing { b } else { a };
@@ -249,7 +249,7 @@ impl<'a> Levels<'a> {
             }
         }
         for b in edges.borders.iter().filter(|b| b.item == node) {
-            let edge = &self.picture.edges[b.edge];
+            let edge = &self.diagram.edges[b.edge];
             let deep = if b.outgoing { edge.from } else { edge.to };
             if deep != node {
                 crossing.push(Border { item: inside(deep), stage: stage(b.outgoing), labelled: false, ..*b });
@@ -261,30 +261,30 @@ impl<'a> Levels<'a> {
     /// Room around the content of a level: along before and after, across before and after.
     fn pads(&self, level: Option<usize>) -> (f64, f64, f64, f64) {
         let Some(group) = level else { return (0.0, 0.0, 0.0, 0.0) };
-        let top = header(self.picture, group) + 8.0;
-        match self.picture.direction {
-            Direction::Down => (top, 16.0, 18.0, 18.0),
-            Direction::Right => (16.0, 16.0, top, 16.0),
+        let top = header(self.diagram, group) + 8.0;
+        match self.diagram.direction {
+            RankDirection::Down => (top, 16.0, 18.0, 18.0),
+            RankDirection::Right => (16.0, 16.0, top, 16.0),
         }
     }
 }
 
 /// The items with what they take beside their own box: the loops to themselves.
 fn with_loops(
-    picture: &Picture,
+    diagram: &Diagram,
     own: &[Vertex],
     loops: &[(usize, usize)],
     index: &BTreeMap<usize, usize>,
 ) -> Vec<Vertex> {
     let mut beside = vec![(0.0f64, 0.0f64); own.len()];
     for (edge, node) in loops {
-        let (w, h) = label_size(&picture.edges[*edge].label);
+        let (w, h) = label_size(&diagram.edges[*edge].label);
         let (extra, tall) = &mut beside[index[node]];
         (*extra, *tall) = (*extra + (w + 30.0), tall.max(h));
     }
-    let with = |(own, (extra, tall)): (&Vertex, (f64, f64))| match picture.direction {
-        Direction::Down => Vertex { wide: own.wide + extra, len: own.len.max(tall), ..*own },
-        Direction::Right => Vertex { len: own.len + extra, wide: own.wide.max(tall), ..*own },
+    let with = |(own, (extra, tall)): (&Vertex, (f64, f64))| match diagram.direction {
+        RankDirection::Down => Vertex { wide: own.wide + extra, len: own.len.max(tall), ..*own },
+        RankDirection::Right => Vertex { len: own.len + extra, wide: own.wide.max(tall), ..*own },
     };
     own.iter().zip(beside).map(with).collect()
 }

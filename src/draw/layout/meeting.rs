@@ -4,12 +4,12 @@ use super::chains::{Chain, Layered, Side, Vertex};
 use super::order::{Segment, order};
 use super::place::{Tie, place};
 use super::{LINE, header};
-use crate::draw::picture::{Direction, Picture};
+use crate::draw::diagram::{Diagram, RankDirection};
 use std::collections::BTreeMap;
 
 /// A level whose edges are chains of vertices, the first of which are its items.
 pub(super) struct EdgeMeeting<'a> {
-    pub(super) picture: &'a Picture,
+    pub(super) diagram: &'a Diagram,
     pub(super) items: &'a [usize],
     /// The box of each item alone, without the loops beside it.
     pub(super) own: &'a [Vertex],
@@ -45,17 +45,17 @@ impl EdgeMeeting<'_> {
     /// known yet.
     pub(super) fn fixed(&self, chain: &Chain, v: usize, source: bool) -> Option<f64> {
         let node = *self.items.get(v)?;
-        let edge = &self.picture.edges[chain.edge];
+        let edge = &self.diagram.edges[chain.edge];
         if let Some(at) = self.ports[v].get(&(chain.edge, source)) {
             return Some(at - self.own[v].wide / 2.0);
         }
         let (port, end) = if source { (edge.from_port, edge.from) } else { (edge.to_port, edge.to) };
-        let (drawn, rows) = (&self.picture.nodes[node], self.picture.direction == Direction::Right);
+        let (drawn, rows) = (&self.diagram.nodes[node], self.diagram.direction == RankDirection::Right);
         if !rows || end != node || (drawn.ins.is_empty() && drawn.outs.is_empty()) {
             return None;
         }
         #[allow(clippy::cast_precision_loss)]
-        port.map(|row| header(self.picture, node) + (row as f64 + 0.5) * LINE - self.own[v].wide / 2.0)
+        port.map(|row| header(self.diagram, node) + (row as f64 + 0.5) * LINE - self.own[v].wide / 2.0)
     }
 
     /// Offsets are from the vertex' middle; a loop beside a box moves the box' middle to the start.

@@ -14,7 +14,7 @@ mod order;
 mod place;
 mod rank;
 
-use super::picture::{Direction, Picture, Shape};
+use super::diagram::{Diagram, RankDirection, Shape};
 use super::text;
 
 /// Font size of headings, pixels.
@@ -68,7 +68,7 @@ pub struct Route {
     pub label: Option<Rect>,
 }
 
-/// A picture's coordinates.
+/// A diagram's coordinates.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Layout {
     /// Of each node.
@@ -80,8 +80,8 @@ pub struct Layout {
 }
 
 /// Size of a node's own text, width and height; for a group: what it needs beside its children.
-pub fn text_size(picture: &Picture, index: usize) -> (f64, f64) {
-    let node = &picture.nodes[index];
+pub fn text_size(diagram: &Diagram, index: usize) -> (f64, f64) {
+    let node = &diagram.nodes[index];
     match node.shape {
         Shape::Dot => (12.0, 12.0),
         _ => {
@@ -92,15 +92,15 @@ pub fn text_size(picture: &Picture, index: usize) -> (f64, f64) {
             let rows = node.ins.len().max(node.outs.len()) as f64;
             // Bold headings are a tenth wider.
             let width = (text::width(&node.title, TITLE) * 1.1).max(widest_line).max(ins + outs + 24.0) + 24.0;
-            (width.max(44.0), header(picture, index) + rows * LINE + if rows > 0.0 { 8.0 } else { 0.0 })
+            (width.max(44.0), header(diagram, index) + rows * LINE + if rows > 0.0 { 8.0 } else { 0.0 })
         }
     }
 }
 
 /// Height of a node's heading and lines.
-pub fn header(picture: &Picture, index: usize) -> f64 {
+pub fn header(diagram: &Diagram, index: usize) -> f64 {
     #[allow(clippy::cast_precision_loss)]
-    let lines = picture.nodes[index].lines.len() as f64;
+    let lines = diagram.nodes[index].lines.len() as f64;
     28.0 + lines * (LINE - 2.0) + if lines > 0.0 { 2.0 } else { 0.0 }
 }
 
@@ -111,16 +111,16 @@ pub fn label_size(lines: &[String]) -> (f64, f64) {
     (lines.iter().map(|l| text::width(l, SMALL)).fold(0.0, f64::max) + 10.0, height)
 }
 
-/// Coordinates for `picture`.
-pub fn layout(picture: &Picture) -> Layout {
-    let mut levels = level::Levels::new(picture);
+/// Coordinates for `diagram`.
+pub fn layout(diagram: &Diagram) -> Layout {
+    let mut levels = level::Levels::new(diagram);
     let size = levels.lay();
-    let mut nodes = vec![Rect::default(); picture.nodes.len()];
-    let mut routes = vec![Route::default(); picture.edges.len()];
+    let mut nodes = vec![Rect::default(); diagram.nodes.len()];
+    let mut routes = vec![Route::default(); diagram.edges.len()];
     levels.write(None, (0.0, 0.0), &mut nodes, &mut routes);
-    let size = match picture.direction {
-        Direction::Right => size,
-        Direction::Down => (size.1, size.0),
+    let size = match diagram.direction {
+        RankDirection::Right => size,
+        RankDirection::Down => (size.1, size.0),
     };
     Layout { nodes, routes, size }
 }
@@ -128,7 +128,7 @@ pub fn layout(picture: &Picture) -> Layout {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::draw::picture::{Edge, Node, Subject};
+    use crate::draw::diagram::{DiagramEdge, DiagramNode, Subject};
 
     fn overlap(a: &Rect, b: &Rect) -> bool {
         let slack = 0.01;
@@ -140,8 +140,8 @@ mod tests {
         a.x >= b.x - slack && a.y >= b.y - slack && a.x + a.w <= b.x + b.w + slack && a.y + a.h <= b.y + b.h + slack
     }
 
-    /// A picture from a seed: groups in groups, edges between any two nodes, labels, loops.
-    fn picture(seed: u64) -> Picture {
+    /// A diagram from a seed: groups in groups, edges between any two nodes, labels, loops.
+    fn diagram(seed: u64) -> Diagram {
         let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
         let mut next = |n: usize| {
             state ^= state << 13;
@@ -149,37 +149,37 @@ mod tests {
             state ^= state << 17;
             (state >> 33) as usize % n
         };
-        let direction = if next(2) == 0 { Direction::Down } else { Direction::Right };
-        let mut picture = Picture::new(Subject::Plan, direction, "seeded");
+        let direction = if next(2) == 0 { RankDirection::Down } else { RankDirection::Right };
+        let mut diagram = Diagram::new(Subject::Plan, direction, "seeded");
         let count = 2 + next(18);
         for i in 0..count {
-            let mut node = Node::new(format!("n{i}"), "x".repeat(1 + next(14)));
+            let mut node = DiagramNode::new(format!("n{i}"), "x".repeat(1 + next(14)));
             node.shape = if next(3) == 0 { Shape::Group } else { Shape::Box };
-            let groups: Vec<usize> = (0..i).filter(|g| picture.nodes[*g].shape == Shape::Group).collect();
+            let groups: Vec<usize> = (0..i).filter(|g| diagram.nodes[*g].shape == Shape::Group).collect();
             if !groups.is_empty() && next(2) == 0 {
                 node.parent = Some(groups[next(groups.len())]);
             }
-            picture.add(node);
+            diagram.add(node);
         }
         for _ in 0..next(2 * count) {
-            let mut edge = Edge::new(next(count), next(count));
+            let mut edge = DiagramEdge::new(next(count), next(count));
             edge.label = (0..next(3)).map(|_| "label".repeat(1 + next(3))).collect();
-            picture.edges.push(edge);
+            diagram.edges.push(edge);
         }
-        picture
+        diagram
     }
 
     #[test]
     fn nothing_overlaps_and_everything_is_inside_its_group() {
         for seed in 0..400 {
-            let picture = picture(seed);
-            let Layout { nodes, routes, size } = layout(&picture);
+            let diagram = diagram(seed);
+            let Layout { nodes, routes, size } = layout(&diagram);
             let all = Rect { x: 0.0, y: 0.0, w: size.0, h: size.1 };
-            for (i, node) in picture.nodes.iter().enumerate() {
+            for (i, node) in diagram.nodes.iter().enumerate() {
                 let around = node.parent.map_or(all, |p| nodes[p]);
                 assert!(inside(&nodes[i], &around), "seed {seed}: node {i} {:?} in {around:?}", nodes[i]);
                 for j in 0..i {
-                    let siblings = picture.nodes[j].parent == node.parent;
+                    let siblings = diagram.nodes[j].parent == node.parent;
                     assert!(!siblings || !overlap(&nodes[i], &nodes[j]), "seed {seed}: nodes {j} and {i}");
                 }
             }
@@ -189,15 +189,15 @@ mod tests {
                 for (j, other) in &labels[..k] {
                     assert!(!overlap(label, other), "seed {seed}: labels of edges {j} and {i}");
                 }
-                for (n, node) in picture.nodes.iter().enumerate() {
-                    let leaf = picture.children(Some(n)).next().is_none();
+                for (n, node) in diagram.nodes.iter().enumerate() {
+                    let leaf = diagram.children(Some(n)).next().is_none();
                     assert!(
                         node.shape == Shape::Group && !leaf || !overlap(label, &nodes[n]),
                         "seed {seed}: label {i} on {n}"
                     );
                 }
             }
-            for (edge, route) in picture.edges.iter().zip(&routes) {
+            for (edge, route) in diagram.edges.iter().zip(&routes) {
                 assert!(route.looped.is_some() || route.runs.len() > 1, "seed {seed}: {edge:?} is not drawn");
             }
         }
@@ -205,13 +205,13 @@ mod tests {
 
     #[test]
     fn many_components_are_laid_out_all_the_same() {
-        let mut picture = Picture::new(Subject::Components, Direction::Right, "chain");
+        let mut diagram = Diagram::new(Subject::Components, RankDirection::Right, "chain");
         for i in 0..3_000 {
-            picture.add(Node::new(format!("n{i}"), format!("n{i}")));
+            diagram.add(DiagramNode::new(format!("n{i}"), format!("n{i}")));
             if i > 0 {
-                picture.edges.push(Edge::new(i - 1, i));
+                diagram.edges.push(DiagramEdge::new(i - 1, i));
             }
         }
-        assert_eq!(layout(&picture).nodes.len(), 3_000);
+        assert_eq!(layout(&diagram).nodes.len(), 3_000);
     }
 }

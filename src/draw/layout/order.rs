@@ -45,7 +45,7 @@ pub fn order(layers: &mut [Vec<usize>], count: usize, segments: &[Segment], besi
     let crossings = |place: &[f64]| -> usize { by_layer.iter().map(|s| count_crossings(s, place)).sum() };
     let mut best = layers.to_vec();
     let mut fewest = crossings(&place);
-    // Work is bounded, so that a picture of ten thousand components is plain rather than late.
+    // Work is bounded, so that a diagram of ten thousand components is plain rather than late.
     let rounds = (2_000_000 / (segments.len() + count + 1)).clamp(2, 24);
     for round in 0..rounds {
         if fewest == 0 {

@@ -1,6 +1,6 @@
 //! Coordinators.
 
-use super::{Form, Key, Languages, Names, Object, key};
+use super::{Form, Key, Languages, NameKind, Object, key};
 use crate::model::codes::{TEXT_BAD_NAME, TEXT_BAD_VALUE, TEXT_UNKNOWN_KEY, TEXT_WRONG_TYPE};
 
 /// What a part of a chart is for.
@@ -53,21 +53,21 @@ pub static STATE: Object = Object {
         .only(Languages::Yaml),
         key(
             "config",
-            Form::Several(&Form::Name(Names::Configuration)),
+            Form::Several(&Form::Name(NameKind::Configuration)),
             "Configurations that are in force while it is active: entering it asks for them, leaving it takes them back.",
             "config = \"enable_copying\"",
             ("config: \"enable copying\"", TEXT_BAD_NAME),
         ),
         key(
             "entry",
-            Form::Several(&Form::Name(Names::Event)),
+            Form::Several(&Form::Name(NameKind::Event)),
             "Names that are raised when it is entered: of configurations (`ID`, `ID.undo`, `undo`), which asks for them, or of events.",
             "entry = \"e_ready\"",
             ("entry: \"e ready\"", TEXT_BAD_NAME),
         ),
         key(
             "exit",
-            Form::Several(&Form::Name(Names::Event)),
+            Form::Several(&Form::Name(NameKind::Event)),
             "Names that are raised when it is left.",
             "exit = \"e_ready\"",
             ("exit: 1", TEXT_WRONG_TYPE),
@@ -145,7 +145,7 @@ pub static TRANSITION: Object = Object {
         .only(Languages::Lua),
         key(
             "effect",
-            Form::Several(&Form::Name(Names::Event)),
+            Form::Several(&Form::Name(NameKind::Event)),
             "Names that are raised when it is taken, after what is left and before what is entered.",
             "effect = \"e_ready\"",
             ("effect: \"e ready\"", TEXT_BAD_NAME),

@@ -1,6 +1,6 @@
 //! Configurations, the seven primitives and what is made of them.
 
-use super::{Form, Key, Names, Object, key};
+use super::{Form, Key, NameKind, Object, key};
 use crate::model::codes::{
     CONF_BAD_STATE, CONF_UNKNOWN_CHANGE, MONITOR_UNKNOWN_WORD, TEXT_BAD_NAME, TEXT_BAD_TIME, TEXT_BAD_VALUE,
     TEXT_NOT_FINITE, TEXT_UNKNOWN_KEY, TEXT_WRONG_TYPE,
@@ -67,7 +67,7 @@ pub static CONFIGURATION: Object = Object {
         .without("each step has `limits.step_timeout_s`"),
         key(
             "group",
-            Form::Name(Names::Plain),
+            Form::Name(NameKind::Plain),
             "Alternatives have the same one: applying one of them replaces the frame of the one in force.",
             "group = \"dof\"",
             ("group: \"d of\"", TEXT_BAD_NAME),
@@ -134,7 +134,7 @@ pub static CONFIRM: Object = Object {
     keys: &[
         key(
             "event",
-            Form::Name(Names::Event),
+            Form::Name(NameKind::Event),
             "The event.",
             "event = \"e_aligned\"",
             ("event: \"e a\"", TEXT_BAD_NAME),
@@ -173,7 +173,7 @@ pub fn primitive(word: &str) -> Option<&'static Primitive> {
 
 const COMPONENT: Key = key(
     "component",
-    Form::Name(Names::Component),
+    Form::Name(NameKind::Component),
     "The component.",
     "component: Dynamics",
     ("component: Dyna-mics", TEXT_BAD_NAME),
@@ -181,7 +181,7 @@ const COMPONENT: Key = key(
 .required();
 
 const COMPONENT_TYPE: Key =
-    key("type", Form::Name(Names::Type), "Its type.", "type: youbot.Dynamics", ("type: \"you bot\"", TEXT_BAD_NAME))
+    key("type", Form::Name(NameKind::Type), "Its type.", "type: youbot.Dynamics", ("type: \"you bot\"", TEXT_BAD_NAME))
         .required();
 
 const PROPERTIES: Key = key(
@@ -194,16 +194,16 @@ const PROPERTIES: Key = key(
 .without("their defaults");
 
 const FROM: Key =
-    key("from", Form::Name(Names::Member), "The out-port.", "from: Kin.jacobian", ("from: Kin", TEXT_BAD_NAME))
+    key("from", Form::Name(NameKind::Member), "The out-port.", "from: Kin.jacobian", ("from: Kin", TEXT_BAD_NAME))
         .required();
 
 const TO: Key =
-    key("to", Form::Name(Names::Member), "The in-port.", "to: Dynamics.jacobian", ("to: 1", TEXT_WRONG_TYPE))
+    key("to", Form::Name(NameKind::Member), "The in-port.", "to: Dynamics.jacobian", ("to: 1", TEXT_WRONG_TYPE))
         .required();
 
 const OPERATION: Key = key(
     "operation",
-    Form::Name(Names::Member),
+    Form::Name(NameKind::Member),
     "The operation.",
     "operation: youbot.setControlMode",
     ("operation: setControlMode", TEXT_BAD_NAME),
@@ -225,7 +225,7 @@ static CREATE: Object = Object {
         COMPONENT_TYPE,
         key(
             "activity",
-            Form::Name(Names::Plain),
+            Form::Name(NameKind::Plain),
             "The activity it runs in; in Lua in the table behind the type.",
             "activity = \"control\"",
             ("activity: 1", TEXT_WRONG_TYPE),
@@ -252,7 +252,7 @@ static REPLACE: Object = Object {
         COMPONENT_TYPE,
         key(
             "activity",
-            Form::Name(Names::Plain),
+            Form::Name(NameKind::Plain),
             "The activity that the new one runs in; in Lua in the table behind the type.",
             "activity = \"control\"",
             ("activity: 1", TEXT_WRONG_TYPE),
@@ -261,7 +261,7 @@ static REPLACE: Object = Object {
         PROPERTIES,
         key(
             "map",
-            Form::Named(&Form::Name(Names::Plain)),
+            Form::Named(&Form::Name(NameKind::Plain)),
             "Ports of the old one, and what they are called on the new one; in Lua in the table behind the type. A connected port that \
              the new one does not have must stand here.",
             "map = { force = \"wrench\" }",
@@ -341,7 +341,7 @@ static PROPERTY_SET: Object = Object {
     keys: &[
         key(
             "property",
-            Form::Name(Names::Member),
+            Form::Name(NameKind::Member),
             "The property.",
             "property: Dynamics.force_gain",
             ("property: force_gain", TEXT_BAD_NAME),
@@ -368,7 +368,7 @@ static PORT_WRITE: Object = Object {
     keys: &[
         key(
             "port",
-            Form::Name(Names::Member),
+            Form::Name(NameKind::Member),
             "The in-port.",
             "port: Cart_Impedance.ext_ref_mode",
             ("port: ext_ref_mode", TEXT_BAD_NAME),

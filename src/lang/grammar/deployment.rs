@@ -1,13 +1,13 @@
 //! The deployment's file.
 
-use super::{Form, Languages, Names, Object, TYPE, key};
+use super::{Form, Languages, NameKind, Object, TYPE, key};
 use crate::limits;
 use crate::model::codes::{
     DEPLOY_NO_JOURNAL, TEXT_BAD_NAME, TEXT_BAD_TIME, TEXT_BAD_VALUE, TEXT_DUPLICATE_KEY, TEXT_NO_FILE, TEXT_WRONG_TYPE,
 };
 
 const FILES: Form = Form::Several(&Form::Path);
-const EVENTS: Form = Form::Several(&Form::Name(Names::Event));
+const EVENTS: Form = Form::Several(&Form::Name(NameKind::Event));
 
 /// Fewest frames a deployment may ask for: the newest, and the one that all others are squashed into.
 const FEWEST_FRAMES: i64 = 2;
@@ -26,7 +26,7 @@ pub static DEPLOYMENT: Object = Object {
         key("davit", Form::Version, "The version of the format.", "davit: 1", ("davit: 2", TEXT_BAD_VALUE)).required(),
         key(
             "name",
-            Form::Name(Names::Plain),
+            Form::Name(NameKind::Plain),
             "What the deployment is called: by commands, and by its control socket.",
             "name: youbot_arm",
             ("name: 3arm", TEXT_BAD_NAME),
@@ -34,7 +34,7 @@ pub static DEPLOYMENT: Object = Object {
         .required(),
         key(
             "platform",
-            Form::Either(&[Form::Name(Names::Plain), Form::Named(&Form::Named(&Form::Value))]),
+            Form::Either(&[Form::Name(NameKind::Plain), Form::Named(&Form::Named(&Form::Value))]),
             "Where its components live: `embedded` runs them in this process, `simulated` only keeps books of them and \
              injects the faults that are asked for; a program may bring others. Options of a platform stand under its name: \
              `platform: { bus: { device: \"can0\" } }`.",
@@ -44,7 +44,7 @@ pub static DEPLOYMENT: Object = Object {
         .required(),
         key(
             "libraries",
-            Form::Several(&Form::Name(Names::Plain)),
+            Form::Several(&Form::Name(NameKind::Plain)),
             "Libraries of component types, by name; `davit types` lists what they offer.",
             "libraries: [standard]",
             ("libraries: [\"my lib\"]", TEXT_BAD_NAME),
@@ -136,7 +136,7 @@ pub static DEPLOYMENT: Object = Object {
         ),
         key(
             "operator",
-            Form::Several(&Form::Either(&[Form::Name(Names::Configuration), Form::Name(Names::Member)])),
+            Form::Several(&Form::Either(&[Form::Name(NameKind::Configuration), Form::Name(NameKind::Member)])),
             "What an operator may do while it is up: configurations to be applied, and properties and in-ports to be set \
              (`Component.member`). `davit check` follows them wherever they may come.",
             "operator: [profile_soft, Cart_Impedance.stiffness]",
@@ -247,7 +247,7 @@ pub static DEPLOY: Object = Object {
     keys: &[
         key(
             "event",
-            Form::Name(Names::Event),
+            Form::Name(NameKind::Event),
             "The event that `davit deploy` raises.",
             "event: e_start",
             ("event: \"e start\"", TEXT_BAD_NAME),
@@ -290,7 +290,7 @@ pub static SHUTDOWN: Object = Object {
     keys: &[
         key(
             "event",
-            Form::Name(Names::Event),
+            Form::Name(NameKind::Event),
             "The event that `davit shutdown`, Ctrl-C and SIGTERM raise.",
             "event: e_shutdown",
             ("event: 1", TEXT_WRONG_TYPE),
@@ -314,7 +314,7 @@ pub static SHUTDOWN: Object = Object {
         .required(),
         key(
             "rest",
-            Form::Several(&Form::Name(Names::Configuration)),
+            Form::Several(&Form::Name(NameKind::Configuration)),
             "Configurations that bring the hardware to rest, in this order, where it is taken down without its coordinators.",
             "rest: [park]",
             ("rest: [\"p ark\"]", TEXT_BAD_NAME),
@@ -385,11 +385,11 @@ pub static REACTION: Object = Object {
             ("after: 1", TEXT_WRONG_TYPE),
         )
         .required(),
-        key("raise", Form::Name(Names::Event), "The event.", "raise: e_qos_ok", ("raise: \"e qos\"", TEXT_BAD_NAME))
+        key("raise", Form::Name(NameKind::Event), "The event.", "raise: e_qos_ok", ("raise: \"e qos\"", TEXT_BAD_NAME))
             .required(),
         key(
             "component",
-            Form::Name(Names::Component),
+            Form::Name(NameKind::Component),
             "The component that raises it.",
             "component: radio",
             ("component: ra-dio", TEXT_BAD_NAME),

@@ -103,7 +103,7 @@ pub enum Form {
     /// The path of a file, from the folder of the file it stands in.
     Path,
     /// The name of something.
-    Name(Names),
+    Name(NameKind),
     /// A state: `STATE`, or `COORDINATOR:STATE`.
     State,
     /// What triggers a transition.
@@ -151,7 +151,7 @@ pub enum Form {
 
 /// What a name can be of; the grammars are those of [`names`](crate::model::names).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Names {
+pub enum NameKind {
     /// A plain name.
     Plain,
     /// A component.
@@ -166,7 +166,7 @@ pub enum Names {
     Member,
 }
 
-impl Names {
+impl NameKind {
     /// What is named, with its article.
     pub fn what(self) -> &'static str {
         match self {

@@ -1,6 +1,6 @@
 //! Monitors. The words of their conditions are in [`words`](crate::lang::words).
 
-use super::{Form, Names, Object, key};
+use super::{Form, NameKind, Object, key};
 use crate::model::codes::{
     MONITOR_BAD_HYSTERESIS, MONITOR_UNKNOWN_WORD, TEXT_BAD_NAME, TEXT_BAD_TIME, TEXT_UNKNOWN_KEY, TEXT_WRONG_TYPE,
 };
@@ -43,7 +43,7 @@ pub static MONITOR: Object = Object {
         .required(),
         key(
             "event",
-            Form::Name(Names::Event),
+            Form::Name(NameKind::Event),
             "Raised when that becomes true, also when it is true at the first look.",
             "event = \"e_high\"",
             ("event: \"e high\"", TEXT_BAD_NAME),
@@ -51,7 +51,7 @@ pub static MONITOR: Object = Object {
         .without("only its verdict counts"),
         key(
             "cleared",
-            Form::Name(Names::Event),
+            Form::Name(NameKind::Event),
             "Raised when it becomes false.",
             "cleared = \"e_calm\"",
             ("cleared: 1", TEXT_WRONG_TYPE),

@@ -1,6 +1,6 @@
 //! Component types that a deployment declares.
 
-use super::{Form, Key, Names, Object, key};
+use super::{Form, Key, NameKind, Object, key};
 use crate::model::codes::{
     MONITOR_UNKNOWN_WORD, TEXT_BAD_NAME, TEXT_BAD_VALUE, TEXT_WRONG_TYPE, TYPE_BAD_DEFAULT, TYPE_BAD_TYPE,
 };
@@ -52,14 +52,14 @@ pub static TYPE: Object = Object {
         ),
         key(
             "start_after",
-            Form::Several(&Form::Name(Names::Type)),
+            Form::Several(&Form::Name(NameKind::Type)),
             "Where one `_default` starts both and connections go round in a circle, components of these types are started first; else the flow of data decides.",
             "start_after: [Driver]",
             ("start_after: [\"my driver\"]", TEXT_BAD_NAME),
         ),
         key(
             "stop_before",
-            Form::Several(&Form::Name(Names::Type)),
+            Form::Several(&Form::Name(NameKind::Type)),
             "Likewise: where connections go round in a circle, it is stopped before components of these types.",
             "stop_before: [Driver]",
             ("stop_before: [\"my driver\"]", TEXT_BAD_NAME),
@@ -226,7 +226,7 @@ pub static EFFECT: Object = Object {
     may_be_empty: false,
     keys: &[key(
         "undo",
-        Form::Name(Names::Plain),
+        Form::Name(NameKind::Plain),
         "The operation of the same component that undoes it, called with the same arguments, or none if it takes none.",
         "undo: park",
         ("undo: \"p ark\"", TEXT_BAD_NAME),

@@ -9,7 +9,8 @@ use crate::lang::grammar::{DEPLOY, SHUTDOWN};
 use crate::lang::tree::{Cx, Fields, Kind, Node};
 use crate::model::finding::did_you_mean;
 use crate::model::{
-    BringUp, ConfigId, Coordinator, EventName, Finding, Ident, OPERATOR, Origin, Statechart, TakeDown, Written, codes,
+    BringUp, ConfigId, Coordinator, CoordinatorNaming, EventName, Finding, Ident, OPERATOR, Origin, Statechart,
+    TakeDown, codes,
 };
 use std::time::Duration;
 
@@ -168,7 +169,7 @@ pub fn join(
     };
     let coordinators = charts.into_iter().zip(names).zip(up.into_iter().zip(down));
     let coordinators = coordinators.map(|(((named, chart, origin), name), (up, down))| {
-        let written = if named.is_some() { Written::Named } else { Written::Alone };
+        let written = if named.is_some() { CoordinatorNaming::Named } else { CoordinatorNaming::Alone };
         Coordinator { name, written, chart, up, failed: failed(name), down, origin }
     });
     let deploy = BringUp { event: rise.event, within: rise.within };

@@ -17,7 +17,7 @@ use super::{name, text, truth};
 use crate::lang::grammar::{CONNECTOR, STATE, TRANSITION};
 use crate::lang::tree::{Cx, Entry, Fields, Kind, Node};
 use crate::limits;
-use crate::model::statechart::{self, Action, Connector, ROOT, State, Statechart, Transition, Trigger};
+use crate::model::statechart::{self, Action, ChartTransition, Connector, ROOT, State, Statechart, Trigger};
 use crate::model::{ConfigId, EventName, Finding, Ident, Origin, codes};
 
 /// Names that mean something else in a state's table, in the one language or the other.
@@ -34,7 +34,7 @@ pub fn statechart(cx: &mut Cx, node: Node) -> Option<Statechart> {
 }
 
 /// A state's parts, wherever they came from.
-struct Parts {
+struct StateParts {
     fields: Fields,
     children: Vec<Entry>,
     transitions: Vec<Node>,
@@ -47,7 +47,7 @@ fn state(cx: &mut Cx, name: Ident, node: Node, depth: usize) -> Option<State> {
         cx.report(finding.help("a statechart has a handful of levels"));
         return None;
     }
-    let Parts { mut fields, children, transitions } = match node.kind {
+    let StateParts { mut fields, children, transitions } = match node.kind {
         Kind::Made("state", named, items) => of_lua(cx, origin, named, items, depth == 0),
         _ => of_yaml(cx, node)?,
     };
@@ -74,7 +74,7 @@ fn state(cx: &mut Cx, name: Ident, node: Node, depth: usize) -> Option<State> {
 
 /// A Lua state: values made by `state` and `conn` are children whatever their key, by `trans` transitions whatever
 /// theirs. Keys that begin with `_` are rFSM's own.
-fn of_lua(cx: &mut Cx, origin: Origin, named: Vec<Entry>, items: Vec<Node>, root: bool) -> Parts {
+fn of_lua(cx: &mut Cx, origin: Origin, named: Vec<Entry>, items: Vec<Node>, root: bool) -> StateParts {
     let (mut children, mut transitions, mut others) = (Vec::new(), Vec::with_capacity(items.len()), Vec::new());
     for node in items {
         match &node.kind {
@@ -99,10 +99,10 @@ fn of_lua(cx: &mut Cx, origin: Origin, named: Vec<Entry>, items: Vec<Node>, root
             _ => others.push(entry),
         }
     }
-    Parts { fields: Fields::new(&STATE, origin, others), children, transitions }
+    StateParts { fields: Fields::new(&STATE, origin, others), children, transitions }
 }
 
-fn of_yaml(cx: &mut Cx, node: Node) -> Option<Parts> {
+fn of_yaml(cx: &mut Cx, node: Node) -> Option<StateParts> {
     let mut fields = Fields::of(cx, node, &STATE)?;
     let children = match fields.take(cx, "states").map(|node| (node.origin, node)) {
         None => Vec::new(),
@@ -120,10 +120,10 @@ fn of_yaml(cx: &mut Cx, node: Node) -> Option<Parts> {
             Vec::new()
         }
     };
-    Some(Parts { fields, children, transitions })
+    Some(StateParts { fields, children, transitions })
 }
 
-fn child(cx: &mut Cx, entry: Entry, depth: usize) -> Option<statechart::Node> {
+fn child(cx: &mut Cx, entry: Entry, depth: usize) -> Option<statechart::ChartNode> {
     let exact = cx.sources.is_exact(entry.origin);
     let key = Node::new(Kind::Str(entry.key.to_string().into()), entry.origin);
     let reserved = RESERVED.contains(&&*entry.key);
@@ -153,17 +153,17 @@ fn child(cx: &mut Cx, entry: Entry, depth: usize) -> Option<statechart::Node> {
         }
         let doc = fields.text(cx, "doc");
         fields.finish(cx);
-        ident.map(|name| statechart::Node::Connector(Connector { name, doc, origin }))
+        ident.map(|name| statechart::ChartNode::Connector(Connector { name, doc, origin }))
     } else {
         // Without a name its inside is still looked at, so that all findings come at once.
         let stand_in = ident.or_else(|| Ident::new("unnamed").ok())?;
         let inside = state(cx, stand_in, value, depth + 1);
-        ident.and(inside).map(statechart::Node::State)
+        ident.and(inside).map(statechart::ChartNode::State)
     };
     node.filter(|_| !reserved)
 }
 
-fn transition(cx: &mut Cx, node: Node) -> Option<Transition> {
+fn transition(cx: &mut Cx, node: Node) -> Option<ChartTransition> {
     let origin = node.origin;
     let mut fields = match node.kind {
         Kind::Made("trans", named, items) => {
@@ -175,7 +175,7 @@ fn transition(cx: &mut Cx, node: Node) -> Option<Transition> {
         }
         _ => Fields::of(cx, node, &TRANSITION)?,
     };
-    let mut out = Transition { origin, ..Transition::default() };
+    let mut out = ChartTransition { origin, ..ChartTransition::default() };
     out.src = reference(cx, &mut fields, "src");
     out.tgt = reference(cx, &mut fields, "tgt");
     for node in fields.several(cx, "events") {

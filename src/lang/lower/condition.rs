@@ -6,7 +6,9 @@ use crate::lang::tree::{Cx, Fields, Kind, Node};
 use crate::lang::words::{CONDITIONS, SIGNALS, Word};
 use crate::limits::MONITOR_DEPTH;
 use crate::model::finding::{are, count, did_you_mean};
-use crate::model::monitor::{Comparison, Condition, ConditionKind, Counter, Interval, PortSignal, Signal, SignalKind};
+use crate::model::monitor::{
+    Comparison, Condition, ConditionKind, Counter, Interval, MonitoredSignal, PortSignal, SignalKind,
+};
 use crate::model::{ComponentName, Finding, Ident, MemberRef, Origin, RunState, codes};
 use std::time::Duration;
 
@@ -246,7 +248,7 @@ fn hysteresis(cx: &mut Cx, node: Node, op: Comparison) -> Option<f64> {
 }
 
 /// A signal.
-fn signal(cx: &mut Cx, node: Node, depth: usize) -> Option<Signal> {
+fn signal(cx: &mut Cx, node: Node, depth: usize) -> Option<MonitoredSignal> {
     use SignalKind as K;
     if depth >= MONITOR_DEPTH {
         too_deep(cx, node.origin);
@@ -254,10 +256,10 @@ fn signal(cx: &mut Cx, node: Node, depth: usize) -> Option<Signal> {
     }
     let origin = cx.place(&node);
     match node.kind {
-        Kind::Str(_) => return Some(Signal { kind: K::Port(port_signal(cx, &node)?), origin }),
+        Kind::Str(_) => return Some(MonitoredSignal { kind: K::Port(port_signal(cx, &node)?), origin }),
         Kind::Int(_) | Kind::Float(_) => {
             let v = number(cx, &node, "a constant", "2.0")?;
-            return Some(Signal { kind: K::Constant(v), origin });
+            return Some(MonitoredSignal { kind: K::Constant(v), origin });
         }
         _ => {}
     }
@@ -296,7 +298,7 @@ fn signal(cx: &mut Cx, node: Node, depth: usize) -> Option<Signal> {
             K::Abs(Box::new(signal(cx, of, depth + 1)?))
         }
     };
-    Some(Signal { kind, origin })
+    Some(MonitoredSignal { kind, origin })
 }
 
 fn port_signal(cx: &mut Cx, node: &Node) -> Option<PortSignal> {

@@ -1,6 +1,6 @@
 //! The budgets of a Lua file: instructions, and what counts like them; processor time; memory.
 
-use super::recorder::{Exhausted, Shared};
+use super::recorder::{Exhausted, SharedRecorder};
 use super::sandbox::line_from;
 use crate::functions::processor_time;
 use crate::limits;
@@ -14,7 +14,7 @@ const TICK: u32 = 100;
 
 /// Starts counting. The hook is global (coroutines have it too); once a budget is used up it fires at every
 /// instruction and fails each time, so that no code of the file goes on.
-pub fn start(lua: &Lua, shared: &Shared) -> mlua::Result<()> {
+pub fn start(lua: &Lua, shared: &SharedRecorder) -> mlua::Result<()> {
     let recorder = shared.clone();
     let started = processor_time();
     // Strings have a metatable, which a file can reach.
@@ -55,7 +55,7 @@ fn too_many() -> String {
 }
 
 /// Counts the elements that a function of the library is going to touch, where no hook reaches.
-pub fn charge(lua: &Lua, shared: &Shared) -> mlua::Result<Function> {
+pub fn charge(lua: &Lua, shared: &SharedRecorder) -> mlua::Result<Function> {
     let recorder = shared.clone();
     lua.create_function(move |lua, elements: f64| {
         let at = line_from(lua, 1);

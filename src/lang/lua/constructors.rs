@@ -1,6 +1,6 @@
 //! The words of the Configurator language and of rFSM, as Lua functions that record what they are given.
 
-use super::recorder::{Classed, Shared};
+use super::recorder::{Classed, SharedRecorder};
 use super::{convert, sandbox};
 use crate::lang::grammar::CHANGES;
 use crate::lang::tree::{Entry, Kind, Node};
@@ -21,7 +21,7 @@ fn entry(key: &'static str, origin: Origin, value: Node) -> Entry {
 }
 
 /// Puts all constructors into the environment.
-pub fn install(lua: &Lua, env: &Table, shared: &Shared) -> mlua::Result<()> {
+pub fn install(lua: &Lua, env: &Table, shared: &SharedRecorder) -> mlua::Result<()> {
     for primitive in CHANGES {
         let verb = primitive.object.name;
         env.raw_set(verb, change(lua, shared, verb, primitive.arguments)?)?;
@@ -65,7 +65,7 @@ pub fn install(lua: &Lua, env: &Table, shared: &Shared) -> mlua::Result<()> {
 /// A constructor that takes one table and records it. `unnamed`: elements without a name are an error, with this help.
 pub fn of_a_table(
     lua: &Lua,
-    shared: &Shared,
+    shared: &SharedRecorder,
     verb: &'static str,
     unnamed: Option<(Code, &'static str)>,
 ) -> mlua::Result<Function> {
@@ -97,7 +97,12 @@ pub fn of_a_table(
     })
 }
 
-fn change(lua: &Lua, shared: &Shared, verb: &'static str, names: &'static [&'static str]) -> mlua::Result<Function> {
+fn change(
+    lua: &Lua,
+    shared: &SharedRecorder,
+    verb: &'static str,
+    names: &'static [&'static str],
+) -> mlua::Result<Function> {
     let recorder = shared.clone();
     lua.create_function(move |lua, args: MultiValue| {
         let line = sandbox::line(lua);
@@ -148,7 +153,7 @@ fn change(lua: &Lua, shared: &Shared, verb: &'static str, names: &'static [&'sta
 }
 
 /// `operation_call(…):undo(operation, …)`
-pub fn undo(lua: &Lua, shared: &Shared) -> mlua::Result<Function> {
+pub fn undo(lua: &Lua, shared: &SharedRecorder) -> mlua::Result<Function> {
     let recorder = shared.clone();
     lua.create_function(move |lua, (handle, args): (LightUserData, MultiValue)| {
         let line = sandbox::line(lua);
@@ -187,7 +192,7 @@ pub fn undo(lua: &Lua, shared: &Shared) -> mlua::Result<Function> {
 }
 
 /// `state`, `trans`, `conn`: called with a table, or as `state:new { … }`. They answer the table itself, as rFSM does.
-fn class_table(lua: &Lua, shared: &Shared, class: &'static str, keep: &Table) -> mlua::Result<Table> {
+fn class_table(lua: &Lua, shared: &SharedRecorder, class: &'static str, keep: &Table) -> mlua::Result<Table> {
     let (recorder, keep) = (shared.clone(), keep.clone());
     let mark = lua.create_function(move |lua, (_, value): (Value, Value)| {
         let line = sandbox::line(lua);

@@ -1,6 +1,6 @@
 //! Lua values → tree, and parameters → Lua values. Under budgets: cycles, sharing and depth end in a finding.
 
-use super::recorder::Shared;
+use super::recorder::SharedRecorder;
 use crate::lang::tree::{Entry, Kind, Node};
 use crate::limits;
 use crate::model::{Finding, Origin, codes};
@@ -23,11 +23,11 @@ pub fn poison() -> Value {
 }
 
 /// A value as a tree. `origin` is the place of the constructor it was given to.
-pub fn node(shared: &Shared, value: &Value, origin: Origin) -> Node {
+pub fn node(shared: &SharedRecorder, value: &Value, origin: Origin) -> Node {
     convert(shared, value, origin, 0)
 }
 
-fn convert(shared: &Shared, value: &Value, origin: Origin, depth: usize) -> Node {
+fn convert(shared: &SharedRecorder, value: &Value, origin: Origin, depth: usize) -> Node {
     let kind = match value {
         Value::Nil => Kind::Null,
         Value::Boolean(v) => Kind::Bool(*v),
@@ -62,7 +62,7 @@ fn convert(shared: &Shared, value: &Value, origin: Origin, depth: usize) -> Node
     Node::new(kind, origin)
 }
 
-fn too_deep(shared: &Shared, origin: Origin) -> Node {
+fn too_deep(shared: &SharedRecorder, origin: Origin) -> Node {
     let message = format!("a table nested more than {} levels deep, or inside itself", limits::TEXT_DEPTH);
     let mut recorder = shared.borrow_mut();
     if recorder.undefined.insert("\0depth".to_owned()) {
@@ -73,12 +73,12 @@ fn too_deep(shared: &Shared, origin: Origin) -> Node {
 }
 
 /// The parts of a table: its elements 1…n in order, its named entries by name.
-pub struct Parts {
+pub struct TableParts {
     pub list: Vec<Node>,
     pub named: Vec<Entry>,
 }
 
-fn table(shared: &Shared, table: &Table, origin: Origin, depth: usize) -> Node {
+fn table(shared: &SharedRecorder, table: &Table, origin: Origin, depth: usize) -> Node {
     if depth >= limits::TEXT_DEPTH {
         return too_deep(shared, origin);
     }
@@ -87,7 +87,7 @@ fn table(shared: &Shared, table: &Table, origin: Origin, depth: usize) -> Node {
         if recorder.classed.is_empty() { None } else { recorder.classed.get(&(table.to_pointer() as usize)).copied() }
     };
     let origin = classed.map_or(origin, |c| c.origin);
-    let Some(Parts { list, mut named }) = parts(shared, table, origin, depth) else {
+    let Some(TableParts { list, mut named }) = parts(shared, table, origin, depth) else {
         return Node::new(Kind::Poison, origin);
     };
     if let Some(classed) = classed {
@@ -108,7 +108,7 @@ fn table(shared: &Shared, table: &Table, origin: Origin, depth: usize) -> Node {
 }
 
 /// Goes through a table once.
-pub fn parts(shared: &Shared, table: &Table, origin: Origin, depth: usize) -> Option<Parts> {
+pub fn parts(shared: &SharedRecorder, table: &Table, origin: Origin, depth: usize) -> Option<TableParts> {
     if shared.borrow_mut().count(table.raw_len(), 0) {
         return None;
     }
@@ -159,7 +159,7 @@ pub fn parts(shared: &Shared, table: &Table, origin: Origin, depth: usize) -> Op
     }
     // Made earlier is written earlier; what was not made by a constructor has no order and is sorted by name.
     named.sort_by(|a, b| a.0.cmp(&b.0).then_with(|| a.1.key.cmp(&b.1.key)));
-    Some(Parts {
+    Some(TableParts {
         list: list.into_iter().map(|(_, node)| node).collect(),
         named: named.into_iter().map(|(_, entry)| entry).collect(),
     })

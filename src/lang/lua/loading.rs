@@ -1,7 +1,7 @@
 //! `rfsm.load` and `rfsm.load_str`: a statechart made of several files. What they load runs in the same closed world,
 //! under the same budgets.
 
-use super::recorder::Shared;
+use super::recorder::SharedRecorder;
 use super::{Loads, chunk, convert, sandbox};
 use crate::diagnostics::Language;
 use crate::lang::tree::Reading;
@@ -15,7 +15,7 @@ const TEXT: &str = "rfsm.load_str";
 const LEVELS: usize = 16;
 
 /// Puts both into the module `rfsm` of the environment.
-pub fn install(lua: &Lua, env: &Table, shared: &Shared) -> Result<()> {
+pub fn install(lua: &Lua, env: &Table, shared: &SharedRecorder) -> Result<()> {
     let rfsm: Table = env.raw_get("rfsm")?;
     let (recorder, world) = (shared.clone(), env.clone());
     rfsm.raw_set(
@@ -44,7 +44,7 @@ pub fn install(lua: &Lua, env: &Table, shared: &Shared) -> Result<()> {
 }
 
 /// Runs a text as a file of its own; lines in findings are its.
-fn within(lua: &Lua, shared: &Shared, text: &str, reading: Reading, world: &Table) -> Result<Value> {
+fn within(lua: &Lua, shared: &SharedRecorder, text: &str, reading: Reading, world: &Table) -> Result<Value> {
     let before = {
         let mut recorder = shared.borrow_mut();
         let name = |file| recorder.cx.sources.file(file).name.to_string();
@@ -72,7 +72,7 @@ fn within(lua: &Lua, shared: &Shared, text: &str, reading: Reading, world: &Tabl
     Ok(value)
 }
 
-fn read(shared: &Shared, name: &str, line: u32) -> Option<(String, Reading)> {
+fn read(shared: &SharedRecorder, name: &str, line: u32) -> Option<(String, Reading)> {
     let mut recorder = shared.borrow_mut();
     let at = recorder.word_at(line, name);
     let Some(Loads { from, folder }) = recorder.loads.clone() else {

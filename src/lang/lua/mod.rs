@@ -18,7 +18,7 @@ use crate::limits;
 use crate::model::{Finding, codes};
 use mlua::chunk::ChunkMode;
 use mlua::{LuaOptions, StdLib};
-use recorder::{Recorder, Shared};
+use recorder::{Recorder, SharedRecorder};
 use std::cell::RefCell;
 use std::path::PathBuf;
 use std::rc::Rc;
@@ -53,7 +53,7 @@ pub fn read(cx: &mut Cx, reading: Reading, params: &mut Params, stem: &str, load
     }
     let mut recorder = Recorder::new(std::mem::take(cx), reading, std::mem::take(params));
     recorder.loads = loads;
-    let shared: Shared = Rc::new(RefCell::new(recorder));
+    let shared: SharedRecorder = Rc::new(RefCell::new(recorder));
     let outcome = run(&shared, &text);
     let mut recorder = std::mem::replace(&mut *shared.borrow_mut(), Recorder::empty(reading));
     let ran = match outcome {
@@ -82,7 +82,7 @@ pub fn read(cx: &mut Cx, reading: Reading, params: &mut Params, stem: &str, load
 }
 
 /// Runs the text and answers what it returned, as a tree.
-fn run(shared: &Shared, text: &str) -> mlua::Result<Option<Node>> {
+fn run(shared: &SharedRecorder, text: &str) -> mlua::Result<Option<Node>> {
     let options = LuaOptions::new().catch_rust_panics(true);
     let lua = mlua::Lua::new_with(StdLib::MATH | StdLib::STRING | StdLib::TABLE | StdLib::COROUTINE, options)?;
     lua.set_memory_limit(limits::LUA_BYTES)?;
@@ -103,7 +103,7 @@ fn run(shared: &Shared, text: &str) -> mlua::Result<Option<Node>> {
 }
 
 /// A text as a function of Lua.
-fn chunk(lua: &mlua::Lua, shared: &Shared, text: &str, env: mlua::Table) -> mlua::Result<mlua::Function> {
+fn chunk(lua: &mlua::Lua, shared: &SharedRecorder, text: &str, env: mlua::Table) -> mlua::Result<mlua::Function> {
     // A first line `#!…` is blanked and not cut: lines keep their numbers.
     let text = if text.starts_with('#') {
         text.split_once('\n').map_or("", |_| &text[text.find('\n').unwrap_or(0)..])

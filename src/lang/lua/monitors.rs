@@ -1,7 +1,7 @@
 //! The words of the monitor language, as Lua functions and methods that record what they are given.
 
 use super::constructors::of_a_table;
-use super::recorder::{Recorder, Shared};
+use super::recorder::{Recorder, SharedRecorder};
 use super::{convert, sandbox};
 use crate::lang::tree::{Entry, Kind, Node};
 use crate::lang::words::{self, CONDITIONS, SIGNALS, Word};
@@ -10,7 +10,7 @@ use crate::model::{Finding, codes};
 use mlua::{Function, LightUserData, Lua, MultiValue, Table, Value};
 
 /// Puts all words into the environment.
-pub fn install(lua: &Lua, env: &Table, shared: &Shared) -> mlua::Result<()> {
+pub fn install(lua: &Lua, env: &Table, shared: &SharedRecorder) -> mlua::Result<()> {
     for word in CONDITIONS.iter().chain(SIGNALS) {
         env.raw_set(word.name, recording(lua, shared, word)?)?;
     }
@@ -21,7 +21,7 @@ pub fn install(lua: &Lua, env: &Table, shared: &Shared) -> mlua::Result<()> {
 }
 
 /// A word as a function.
-fn recording(lua: &Lua, shared: &Shared, word: &'static Word) -> mlua::Result<Function> {
+fn recording(lua: &Lua, shared: &SharedRecorder, word: &'static Word) -> mlua::Result<Function> {
     let recorder = shared.clone();
     lua.create_function(move |lua, args: MultiValue| {
         let line = sandbox::line(lua);
@@ -45,7 +45,7 @@ fn recording(lua: &Lua, shared: &Shared, word: &'static Word) -> mlua::Result<Fu
 }
 
 /// The words that are also methods, by name.
-pub fn methods(lua: &Lua, shared: &Shared) -> mlua::Result<Table> {
+pub fn methods(lua: &Lua, shared: &SharedRecorder) -> mlua::Result<Table> {
     let table = lua.create_table()?;
     for word in CONDITIONS.iter().filter(|word| word.method) {
         table.raw_set(word.name, recording(lua, shared, word)?)?;
@@ -54,7 +54,7 @@ pub fn methods(lua: &Lua, shared: &Shared) -> mlua::Result<Table> {
 }
 
 /// `age("A.x") > 0.1` cannot be recorded: Lua makes a bool of every comparison. It is said, with the words that can.
-pub fn compared(shared: &Shared, lua: &Lua, sides: [&Value; 2]) {
+pub fn compared(shared: &SharedRecorder, lua: &Lua, sides: [&Value; 2]) {
     let made = |value: &Value| match value {
         Value::LightUserData(handle) => convert::index_of(*handle),
         _ => None,

@@ -9,7 +9,7 @@ use std::cell::RefCell;
 use std::rc::Rc;
 
 /// The recorder as the constructors hold it.
-pub type Shared = Rc<RefCell<Recorder>>;
+pub type SharedRecorder = Rc<RefCell<Recorder>>;
 
 /// One thing a constructor made.
 pub struct Recorded {

@@ -8,7 +8,7 @@
 
 use super::budget::{charge, known_metatables};
 use super::convert;
-use super::recorder::Shared;
+use super::recorder::SharedRecorder;
 use crate::functions;
 use crate::limits;
 use crate::model::finding::{did_you_mean, nearest};
@@ -110,7 +110,7 @@ pub fn line_from(lua: &Lua, level: usize) -> u32 {
 }
 
 /// The table of globals of a file.
-pub fn environment(lua: &Lua, shared: &Shared) -> mlua::Result<Table> {
+pub fn environment(lua: &Lua, shared: &SharedRecorder) -> mlua::Result<Table> {
     let globals = lua.globals();
     let charge = charge(lua, shared)?;
     functions::loops(lua, &charge)?;
@@ -186,7 +186,7 @@ pub fn environment(lua: &Lua, shared: &Shared) -> mlua::Result<Table> {
 }
 
 /// What a protected call answers. Budgets and memory are not caught: a file must not outlive them.
-fn caught(lua: &Lua, shared: &Shared, outcome: mlua::Result<MultiValue>) -> mlua::Result<MultiValue> {
+fn caught(lua: &Lua, shared: &SharedRecorder, outcome: mlua::Result<MultiValue>) -> mlua::Result<MultiValue> {
     match outcome {
         Ok(values) => Ok(std::iter::once(Value::Boolean(true)).chain(values).collect()),
         Err(error) => {
@@ -201,7 +201,7 @@ fn caught(lua: &Lua, shared: &Shared, outcome: mlua::Result<MultiValue>) -> mlua
 }
 
 /// A library with some of its functions; the others are told to be closed.
-fn library(lua: &Lua, shared: &Shared, env: &Table, name: &'static str, kept: &[&str]) -> mlua::Result<Table> {
+fn library(lua: &Lua, shared: &SharedRecorder, env: &Table, name: &'static str, kept: &[&str]) -> mlua::Result<Table> {
     let full: Table = lua.globals().raw_get(name)?;
     let table = lua.create_table()?;
     for function in kept {
@@ -212,13 +212,13 @@ fn library(lua: &Lua, shared: &Shared, env: &Table, name: &'static str, kept: &[
     Ok(table)
 }
 
-fn closed(lua: &Lua, shared: &Shared, table: &Table, name: &str) -> mlua::Result<()> {
+fn closed(lua: &Lua, shared: &SharedRecorder, table: &Table, name: &str) -> mlua::Result<()> {
     undefined(lua, shared, table, &format!("{name}."))
 }
 
 /// Makes reading an absent name of a table a finding, and its value one that everything can be done with: so one
 /// mistake gives one finding, and the rest of the file is still looked at.
-pub fn undefined(lua: &Lua, shared: &Shared, table: &Table, prefix: &str) -> mlua::Result<()> {
+pub fn undefined(lua: &Lua, shared: &SharedRecorder, table: &Table, prefix: &str) -> mlua::Result<()> {
     let (recorder, prefix) = (shared.clone(), prefix.to_owned());
     let meta = lua.create_table()?;
     let absent = lua.create_function(move |lua, (table, key): (Table, Value)| {
@@ -277,7 +277,7 @@ pub fn undefined(lua: &Lua, shared: &Shared, table: &Table, prefix: &str) -> mlu
 }
 
 /// What can be done with handles and with the undefined value: `:undo` of a handle, anything with the latter.
-fn handles(lua: &Lua, shared: &Shared) -> mlua::Result<Table> {
+fn handles(lua: &Lua, shared: &SharedRecorder) -> mlua::Result<Table> {
     let meta = lua.create_table()?;
     let quiet = lua.create_function(|_, (_, _): (Value, MultiValue)| Ok(convert::poison()))?;
     for event in [

@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 
 /// What is kept, as texts.
 #[derive(Debug, Default)]
-pub struct Kept {
+pub struct KeptFiles {
     /// The file of each coordinator that is kept.
     pub coordinators: BTreeMap<Ident, String>,
     /// All files, by name.
@@ -20,7 +20,7 @@ pub struct Kept {
     pub keys: String,
 }
 
-impl Kept {
+impl KeptFiles {
     /// What is kept of a deployment.
     pub fn of(deployment: &Deployment) -> Self {
         let mut kept = Self::default();

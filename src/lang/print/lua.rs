@@ -3,7 +3,7 @@
 use super::wrap::wrap;
 use super::{change, float, monitor, seconds};
 use crate::diagnostics::Language;
-use crate::model::statechart::{Action, Node, State, Transition, Trigger};
+use crate::model::statechart::{Action, ChartNode, ChartTransition, State, Trigger};
 use crate::model::{Configuration, OnFailure, Origin, StateList, Statechart, Value};
 use std::fmt::Write as _;
 
@@ -138,7 +138,7 @@ fn raised(actions: &[(Action, Origin)]) -> Vec<String> {
     actions.iter().filter_map(one).collect()
 }
 
-fn transition(out: &mut String, t: &Transition) {
+fn transition(out: &mut String, t: &ChartTransition) {
     out.push_str("trans { ");
     for (name, reference) in [("src", &t.src), ("tgt", &t.tgt)] {
         if let Some((text, _)) = reference {
@@ -176,8 +176,8 @@ fn state(out: &mut String, s: &State, indent: usize) {
     for child in &s.children {
         _ = write!(body, "{pad}{} = ", key(child.name().as_str()));
         match child {
-            Node::State(child) => state(&mut body, child, indent + 1),
-            Node::Connector(connector) => {
+            ChartNode::State(child) => state(&mut body, child, indent + 1),
+            ChartNode::Connector(connector) => {
                 let doc = connector.doc.as_ref().map_or(String::new(), |doc| format!(" doc = {} ", quoted(doc)));
                 _ = write!(body, "conn {{{doc}}}");
             }

@@ -15,8 +15,8 @@ pub use monitor::{condition, monitors};
 pub use yaml::{configurations_yaml, coordinator_yaml, deployment_yaml};
 
 use crate::diagnostics::Language;
-use crate::model::{Configuration, Deployment, Ident, Statechart, Written};
-use kept::Kept;
+use crate::model::{Configuration, CoordinatorNaming, Deployment, Ident, Statechart};
+use kept::KeptFiles;
 use std::time::Duration;
 
 /// Configurations in a language; YAML for SCXML, which has no word for them.
@@ -46,7 +46,7 @@ pub fn deployment(deployment: &Deployment, language: Language) -> Vec<(String, S
         Language::Yaml => ("yaml", "yaml"),
         Language::Scxml => ("scxml", "yaml"),
     };
-    let kept = Kept::of(deployment);
+    let kept = KeptFiles::of(deployment);
     let c = format!("configurations.{other}");
     let one = alone(deployment);
     let file = |name: &Ident| match kept.coordinators.get(name) {
@@ -73,12 +73,12 @@ pub fn deployment(deployment: &Deployment, language: Language) -> Vec<(String, S
 
 /// Whether there is one coordinator, written without a name.
 fn alone(deployment: &Deployment) -> bool {
-    matches!(&deployment.coordinators[..], [one] if one.written == Written::Alone)
+    matches!(&deployment.coordinators[..], [one] if one.written == CoordinatorNaming::Alone)
 }
 
 /// The files of the coordinators that have functions, and so stay what they are.
 pub fn kept(deployment: &Deployment) -> Vec<(Ident, String)> {
-    Kept::of(deployment).coordinators.into_iter().collect()
+    KeptFiles::of(deployment).coordinators.into_iter().collect()
 }
 
 /// A float that reads back as the same float, and as a float in every reader of YAML: with a point.

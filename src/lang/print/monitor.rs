@@ -4,7 +4,7 @@ use super::wrap::wrap;
 use super::{float, lua, seconds, yaml};
 use crate::diagnostics::Language;
 use crate::model::Monitor;
-use crate::model::monitor::{Condition, ConditionKind, Interval, Sampling, Signal, SignalKind};
+use crate::model::monitor::{Condition, ConditionKind, Interval, MonitoredSignal, Sampling, SignalKind};
 use std::collections::HashMap;
 use std::fmt::Write as _;
 
@@ -59,11 +59,11 @@ fn interval(i: Interval, language: Language) -> String {
     list(&[seconds(i.from), i.to.map_or(infinite.to_owned(), seconds)], language)
 }
 
-fn signals(all: &[Signal], language: Language) -> Vec<String> {
+fn signals(all: &[MonitoredSignal], language: Language) -> Vec<String> {
     all.iter().map(|s| signal(s, language)).collect()
 }
 
-fn signal(s: &Signal, l: Language) -> String {
+fn signal(s: &MonitoredSignal, l: Language) -> String {
     match &s.kind {
         SignalKind::Port(port) => text(&port.to_string(), l),
         SignalKind::Age(port) => call("age", &[text(&port.to_string(), l)], l),
@@ -83,7 +83,7 @@ fn signal(s: &Signal, l: Language) -> String {
 /// Conditions that stand in several places. In YAML the first of them gets a name (`&c1 …`) and the others are that name
 /// (`*c1`); in Lua, where a local would have to stand somewhere, each is written out.
 #[derive(Default)]
-pub(super) struct Shared {
+pub(super) struct CommonConditions {
     /// By their text, how often they stand; what is in one counts once for all of them.
     times: HashMap<String, usize>,
     /// By their text, the names of those that were written.
@@ -93,7 +93,7 @@ pub(super) struct Shared {
 /// Characters of a condition before a name is shorter.
 const WORTH_A_NAME: usize = 48;
 
-impl Shared {
+impl CommonConditions {
     /// What stands in several places in these conditions of one text.
     pub(super) fn of<'a>(conditions: impl Iterator<Item = &'a Condition>, language: Language) -> Self {
         let mut shared = Self::default();
@@ -137,15 +137,15 @@ fn inside(c: &Condition) -> Vec<&Condition> {
 
 /// A condition by itself, on one line.
 pub fn condition(c: &Condition, language: Language) -> String {
-    plain(c, language, &mut Shared::default())
+    plain(c, language, &mut CommonConditions::default())
 }
 
 /// A condition, or its name where it was written before.
-fn shared_condition(c: &Condition, l: Language, shared: &mut Shared) -> String {
+fn shared_condition(c: &Condition, l: Language, shared: &mut CommonConditions) -> String {
     if shared.times.is_empty() {
         return plain(c, l, shared);
     }
-    let key = plain(c, l, &mut Shared::default());
+    let key = plain(c, l, &mut CommonConditions::default());
     if shared.times.get(&key).is_none_or(|times| *times < 2) {
         return plain(c, l, shared);
     }
@@ -160,7 +160,7 @@ fn shared_condition(c: &Condition, l: Language, shared: &mut Shared) -> String {
     named
 }
 
-fn plain(c: &Condition, l: Language, shared: &mut Shared) -> String {
+fn plain(c: &Condition, l: Language, shared: &mut CommonConditions) -> String {
     use ConditionKind as K;
     let mut one = |c: &Condition| shared_condition(c, l, shared);
     match &c.kind {
@@ -196,7 +196,7 @@ pub fn monitors(list: &[Monitor], language: Language) -> String {
     if list.is_empty() {
         return if is_lua { "Monitors {}\n".to_owned() } else { "monitors: {}\n".to_owned() };
     }
-    let mut shared = Shared::of(list.iter().map(|m| &m.when), language);
+    let mut shared = CommonConditions::of(list.iter().map(|m| &m.when), language);
     let mut out = String::from(if is_lua { "Monitors {\n" } else { "monitors:\n" });
     for m in list {
         if is_lua {

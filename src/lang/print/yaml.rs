@@ -1,13 +1,13 @@
 //! Printing in YAML.
 
-use super::monitor::{self, Shared};
+use super::monitor::{self, CommonConditions};
 use super::wrap::wrap;
 use super::{change, float, milliseconds, seconds};
 use crate::diagnostics::Language;
-use crate::model::statechart::{Action, Node, State, Transition, Trigger};
+use crate::model::statechart::{Action, ChartNode, ChartTransition, State, Trigger};
 use crate::model::{
-    ComponentType, Configuration, Coordinator, Deployment, Direction, Effect, Ident, OnFailure, Origin, StateList,
-    Statechart, Tunable, Value, Written,
+    ComponentType, Configuration, Coordinator, CoordinatorNaming, Deployment, Direction, Effect, Ident, OnFailure,
+    Origin, StateList, Statechart, Tunable, Value,
 };
 use std::fmt::{Display, Write as _};
 
@@ -85,7 +85,7 @@ pub fn configurations_yaml(configurations: &[Configuration]) -> String {
         return "configurations: {}\n".to_owned();
     }
     let mut out = String::from("configurations:\n");
-    let mut shared = Shared::of(configurations.iter().filter_map(|c| c.holds.as_ref()), Language::Yaml);
+    let mut shared = CommonConditions::of(configurations.iter().filter_map(|c| c.holds.as_ref()), Language::Yaml);
     for c in configurations {
         let mut body = String::new();
         if let Some(description) = &c.description {
@@ -141,7 +141,7 @@ fn raised(actions: &[(Action, Origin)]) -> Vec<String> {
     actions.iter().filter_map(one).collect()
 }
 
-fn transition(tr: &Transition) -> String {
+fn transition(tr: &ChartTransition) -> String {
     let mut parts = Vec::new();
     for (name, reference) in [("src", &tr.src), ("tgt", &tr.tgt)] {
         if let Some((path, _)) = reference {
@@ -183,8 +183,8 @@ fn state(out: &mut String, s: &State, indent: usize) {
         for child in &s.children {
             _ = write!(body, "{pad}  {}:", t(&child.name()));
             match child {
-                Node::State(child) => state(&mut body, child, indent + 2),
-                Node::Connector(c) => {
+                ChartNode::State(child) => state(&mut body, child, indent + 2),
+                ChartNode::Connector(c) => {
                     let doc = c.doc.as_ref().map_or(String::new(), |doc| format!(", doc: {}", quoted(doc)));
                     _ = writeln!(body, " {{ connector: true{doc} }}");
                 }
@@ -338,11 +338,11 @@ pub fn deployment_yaml(
     }
     _ = writeln!(out, "configurations: {}", list(configurations.iter().map(|file| text(file))));
     let files = || d.coordinators.iter().zip(coordinators);
-    for (_, file) in files().filter(|(c, _)| c.written == Written::Alone) {
+    for (_, file) in files().filter(|(c, _)| c.written == CoordinatorNaming::Alone) {
         _ = writeln!(out, "coordinator: {}", text(file));
     }
     let named: Vec<String> = files()
-        .filter(|(c, _)| c.written == Written::Named)
+        .filter(|(c, _)| c.written == CoordinatorNaming::Named)
         .map(|(c, file)| format!("{}: {}", t(&c.name), text(file)))
         .collect();
     if !named.is_empty() {

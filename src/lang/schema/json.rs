@@ -3,7 +3,7 @@
 //! It is no more than a first look: what it refuses, reading refuses too (a test compares them); what it lets stand may still be
 //! refused for what stands in other places.
 
-use crate::lang::grammar::{CHANGES, File, Form, Key, Names, Object, Words};
+use crate::lang::grammar::{CHANGES, File, Form, Key, NameKind, Object, Words};
 use crate::lang::words::{CONDITIONS, Word};
 use crate::model::RunState;
 use serde_json::{Map, Value, json};
@@ -135,7 +135,7 @@ fn form(form: &Form) -> Value {
 }
 
 fn states() -> Value {
-    let who = Names::Component.pattern().trim_matches(['^', '$']);
+    let who = NameKind::Component.pattern().trim_matches(['^', '$']);
     let demanded: Vec<&str> = RunState::NAMES
         .iter()
         .copied()

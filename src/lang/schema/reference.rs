@@ -8,7 +8,7 @@ use std::fmt::Write as _;
 
 /// What `davit explain` tells of something that can be written.
 #[derive(Debug, Clone, Serialize)]
-pub struct Entry {
+pub struct ReferenceEntry {
     /// Its name: `timeout`.
     pub name: &'static str,
     /// What it stands in: `configuration`; of a table or a word nothing.
@@ -36,7 +36,7 @@ pub struct Entry {
     pub refused: Option<(&'static str, &'static str)>,
 }
 
-impl Entry {
+impl ReferenceEntry {
     /// Behind its name, whether it must be there.
     pub fn demanded(&self) -> String {
         match (self.required, self.instead) {
@@ -69,9 +69,9 @@ impl Example {
     }
 }
 
-fn of_key(object: &Object, key: &Key) -> Entry {
+fn of_key(object: &Object, key: &Key) -> ReferenceEntry {
     let refused = (!key.refused.is_empty() && key.language != Languages::Lua).then_some((key.refused, key.code.0));
-    Entry {
+    ReferenceEntry {
         name: key.name,
         of: Some(object.name),
         form: key.form.words(Words::Plain),
@@ -85,9 +85,9 @@ fn of_key(object: &Object, key: &Key) -> Entry {
     }
 }
 
-fn of_object(object: &Object) -> Entry {
+fn of_object(object: &Object) -> ReferenceEntry {
     let keys: Vec<_> = object.names().map(|name| format!("`{name}`")).collect();
-    Entry {
+    ReferenceEntry {
         name: object.name,
         of: None,
         form: format!("a table with {}", keys.join(", ")),
@@ -104,8 +104,8 @@ fn of_object(object: &Object) -> Entry {
     }
 }
 
-fn of_word(word: &Word, what: &str) -> Entry {
-    Entry {
+fn of_word(word: &Word, what: &str) -> ReferenceEntry {
+    ReferenceEntry {
         name: word.name,
         of: None,
         form: format!("{what} of the monitors' language"),
@@ -119,8 +119,8 @@ fn of_word(word: &Word, what: &str) -> Entry {
     }
 }
 
-fn of_own_word(term: &OwnWord) -> Entry {
-    Entry {
+fn of_own_word(term: &OwnWord) -> ReferenceEntry {
+    ReferenceEntry {
         name: term.name,
         of: None,
         form: term.form.to_owned(),
@@ -158,7 +158,7 @@ fn tables(path: &str) -> Vec<&'static Object> {
 
 /// Everything that can be written, with where it stands: `timeout`, `configuration.timeout`, `type.ports.unit`, `configuration`,
 /// `above`, `e_after`.
-pub fn about(name: &str) -> Vec<Entry> {
+pub fn about(name: &str) -> Vec<ReferenceEntry> {
     // A time event as it is written.
     let name = name.split('(').next().unwrap_or(name);
     let (of, key) = name.rsplit_once('.').map_or((None, name), |(of, key)| (Some(of), key));

@@ -1,7 +1,7 @@
 //! What is done on entry, on exit and by transitions, and everything that has no counterpart here.
 
 use super::transition::seconds;
-use super::{Reader, is_state, own};
+use super::{ScxmlReader, is_state, own};
 use crate::lang::print::scxml::SCXML;
 use crate::model::finding::did_you_mean;
 use crate::model::statechart::Action;
@@ -32,7 +32,7 @@ pub(super) const NO_COUNTERPART: &[(&str, &str)] = &[
 const KNOWN: &[&str] =
     &["scxml", "state", "final", "initial", "transition", "onentry", "onexit", "send", "cancel", "log", "datamodel"];
 
-impl<'t> Reader<'_, 't> {
+impl<'t> ScxmlReader<'_, 't> {
     /// What is raised, and what is sent later with its seconds.
     pub(super) fn actions(&mut self, block: Element<'_, 't>) -> (Vec<(Action, Origin)>, BTreeMap<String, f64>) {
         let (mut actions, mut later) = (Vec::new(), BTreeMap::new());

@@ -1,18 +1,18 @@
 //! Where SCXML means more than the words that are the same here: leading pieces of event names, document order, and leaving
 //! the state that a transition leads back to.
 
-use super::Reader;
+use super::ScxmlReader;
 use crate::limits;
-use crate::model::statechart::{Connector, Node, State, Statechart, Transition};
+use crate::model::statechart::{ChartNode, ChartTransition, Connector, State, Statechart};
 use crate::model::{Ident, Origin, codes};
 use roxmltree::Node as Element;
 use std::collections::BTreeSet;
 
 /// The names of events in a document, for descriptors that mean several.
 #[derive(Debug, Default)]
-pub(super) struct Names(BTreeSet<String>);
+pub(super) struct EventNames(BTreeSet<String>);
 
-impl Names {
+impl EventNames {
     /// Of transitions and of what is sent.
     pub fn of(root: Element<'_, '_>) -> Self {
         let mut names = BTreeSet::new();
@@ -30,7 +30,7 @@ impl Names {
     }
 }
 
-impl<'t> Reader<'_, 't> {
+impl<'t> ScxmlReader<'_, 't> {
     /// The events that a descriptor means: itself, and the names in the document that begin with it.
     pub(super) fn descriptor(&mut self, element: Element<'_, 't>, event: &str) -> Vec<String> {
         let name = event.strip_suffix(".*").unwrap_or(event);
@@ -72,8 +72,8 @@ impl<'t> Reader<'_, 't> {
         for (target, connector) in &self.again {
             let Some((scope, name)) = connector.rsplit_once('.') else { continue };
             let (Some(scope), Ok(ident)) = (find(&mut chart.root, scope), Ident::new(name)) else { continue };
-            scope.children.push(Node::Connector(Connector { name: ident, doc: None, origin }));
-            let mut transition = Transition::new(name, target, []);
+            scope.children.push(ChartNode::Connector(Connector { name: ident, doc: None, origin }));
+            let mut transition = ChartTransition::new(name, target, []);
             transition.origin = origin;
             scope.transitions.push(transition);
         }
@@ -81,7 +81,7 @@ impl<'t> Reader<'_, 't> {
 
     /// Four and more transitions of one state and one priority are tried in another order than the written one (rFSM's sort
     /// is not stable). Where more than one of them can be meant they get priorities.
-    pub(super) fn in_document_order(&self, list: &mut [Transition]) {
+    pub(super) fn in_document_order(&self, list: &mut [ChartTransition]) {
         if self.ours {
             return;
         }
@@ -100,7 +100,7 @@ impl<'t> Reader<'_, 't> {
 }
 
 /// Whether one event can start two of them.
-fn several_are_meant(list: &[Transition]) -> bool {
+fn several_are_meant(list: &[ChartTransition]) -> bool {
     let mut seen = BTreeSet::new();
     list.iter().any(|transition| {
         let own: BTreeSet<String> = transition.events.iter().map(|(trigger, _)| trigger.to_string()).collect();
@@ -114,7 +114,7 @@ fn find<'s>(root: &'s mut State, fqn: &str) -> Option<&'s mut State> {
     let mut at = root;
     for piece in fqn.split('.').skip(1) {
         at = at.children.iter_mut().find_map(|child| match child {
-            Node::State(state) if state.name.as_str() == piece => Some(state),
+            ChartNode::State(state) if state.name.as_str() == piece => Some(state),
             _ => None,
         })?;
     }

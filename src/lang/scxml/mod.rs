@@ -12,10 +12,10 @@ mod transition;
 use super::print::scxml::{OURS, SCXML};
 use super::tree::{Cx, Reading};
 use crate::limits;
-use crate::model::statechart::{Connector, INITIAL, Node, ROOT, State, Statechart, Transition};
+use crate::model::statechart::{ChartNode, ChartTransition, Connector, INITIAL, ROOT, State, Statechart};
 use crate::model::{Code, ConfigId, Finding, Ident, Origin, codes};
-use meaning::Names;
-use places::{Places, TooMuch, too_much};
+use meaning::EventNames;
+use places::{LineIndex, TooMuch, too_much};
 use roxmltree::{Document, Node as Element, ParsingOptions};
 use rustc_hash::{FxHashMap, FxHashSet};
 use std::collections::BTreeMap;
@@ -24,7 +24,7 @@ use std::collections::BTreeMap;
 pub fn read(cx: &mut Cx, reading: Reading) -> Option<Statechart> {
     let text = cx.sources.file(reading.file).text.clone();
     if let Some((what, offset)) = too_much(&text) {
-        let origin = Places::new(reading, &text).place(cx, offset, 1);
+        let origin = LineIndex::new(reading, &text).place(cx, offset, 1);
         let (code, message, help) = match what {
             TooMuch::Deep => (
                 codes::TEXT_TOO_DEEP,
@@ -66,22 +66,22 @@ pub fn read(cx: &mut Cx, reading: Reading) -> Option<Statechart> {
             return None;
         }
     };
-    let mut reader = Reader {
+    let mut reader = ScxmlReader {
         cx,
-        places: Places::new(reading, &text),
+        places: LineIndex::new(reading, &text),
         ids: BTreeMap::new(),
         full: FxHashMap::default(),
         finals: FxHashMap::default(),
         ours: false,
-        names: Names::default(),
+        names: EventNames::default(),
         again: BTreeMap::new(),
     };
     reader.document(document.root_element())
 }
 
-struct Reader<'c, 't> {
+struct ScxmlReader<'c, 't> {
     cx: &'c mut Cx,
-    places: Places<'t>,
+    places: LineIndex<'t>,
     /// Full names of the states by their ids.
     ids: BTreeMap<String, String>,
     /// The same by their elements, which need no id.
@@ -91,7 +91,7 @@ struct Reader<'c, 't> {
     /// Written by us: the meaning is rFSM's already.
     ours: bool,
     /// All names of events, in documents of others.
-    names: Names,
+    names: EventNames,
     /// Connectors that leave a state and enter it again, by the full name of the state.
     again: BTreeMap<String, String>,
 }
@@ -104,7 +104,7 @@ fn is_state(element: Element<'_, '_>) -> bool {
     ["state", "final", "parallel", "history"].iter().any(|name| element.has_tag_name((SCXML, *name)))
 }
 
-impl<'t> Reader<'_, 't> {
+impl<'t> ScxmlReader<'_, 't> {
     fn at(&mut self, element: Element<'_, 't>) -> Origin {
         let start = element.range().start;
         let length = element.tag_name().name().chars().count() + 1;
@@ -140,7 +140,7 @@ impl<'t> Reader<'_, 't> {
         self.ids.insert(ROOT.to_owned(), ROOT.to_owned());
         self.name_all(top, ROOT);
         if !self.ours {
-            self.names = Names::of(root);
+            self.names = EventNames::of(root);
         }
         let mut state = self.state(top, ROOT, Ident::new(ROOT).ok()?);
         if top != root {
@@ -259,7 +259,7 @@ impl<'t> Reader<'_, 't> {
         let Some(full) = full else { return };
         let Some(name) = full.rsplit('.').next().and_then(|name| Ident::new(name).ok()) else { return };
         let delays = self.delays(element);
-        let mut read: Vec<(usize, Transition)> = Vec::new();
+        let mut read: Vec<(usize, ChartTransition)> = Vec::new();
         for (place, transition) in element.children().filter(|c| c.has_tag_name((SCXML, "transition"))).enumerate() {
             // Ours stand in the order in which they are tried; this is where they were written.
             let written = own(transition, "order").and_then(|order| order.parse().ok()).filter(|_| self.ours);
@@ -267,7 +267,7 @@ impl<'t> Reader<'_, 't> {
             read.extend(one.map(|one| (written.unwrap_or(place), one)));
         }
         read.sort_by_key(|(place, _)| *place);
-        let mut list: Vec<Transition> = read.into_iter().map(|(_, transition)| transition).collect();
+        let mut list: Vec<ChartTransition> = read.into_iter().map(|(_, transition)| transition).collect();
         self.in_document_order(&mut list);
         state.transitions.extend(list);
         if own(element, "doo").is_some() {
@@ -280,11 +280,11 @@ impl<'t> Reader<'_, 't> {
         }
         if own(element, "kind") == Some("connector") {
             let origin = self.at(element);
-            state.children.push(Node::Connector(Connector { name, doc: None, origin }));
+            state.children.push(ChartNode::Connector(Connector { name, doc: None, origin }));
             return;
         }
         let inner = self.state(element, &full, name);
-        state.children.push(Node::State(inner));
+        state.children.push(ChartNode::State(inner));
     }
 
     /// The way in: `<initial>`, the attribute, or the first state written.
@@ -314,7 +314,7 @@ impl<'t> Reader<'_, 't> {
         };
         // Ours, when it is a connector: it is called `initial`, and its transitions stand with it.
         if let Some(target) = target.filter(|target| *target != format!("{fqn}.{INITIAL}")) {
-            let mut transition = Transition::new(INITIAL, &target, []);
+            let mut transition = ChartTransition::new(INITIAL, &target, []);
             transition.origin = self.at(element);
             state.transitions.insert(0, transition);
         }

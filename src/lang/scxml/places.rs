@@ -65,7 +65,7 @@ pub fn too_much(text: &str) -> Option<(TooMuch, usize)> {
 }
 
 /// Byte offsets as places.
-pub struct Places<'t> {
+pub struct LineIndex<'t> {
     reading: Reading,
     text: &'t str,
     /// Offset, line and column about every so many bytes: a document may be one long line.
@@ -75,7 +75,7 @@ pub struct Places<'t> {
 /// Bytes between two marks.
 const STRIDE: usize = 1024;
 
-impl<'t> Places<'t> {
+impl<'t> LineIndex<'t> {
     pub fn new(reading: Reading, text: &'t str) -> Self {
         let mut marks = vec![(0, 1, 0)];
         let (mut line, mut column) = (1, 0);

@@ -1,17 +1,17 @@
 //! Transitions and what triggers them.
 
 use super::content::NO_COUNTERPART;
-use super::{Reader, is_state, own};
+use super::{ScxmlReader, is_state, own};
 use crate::lang::print::scxml::SCXML;
 use crate::limits;
 use crate::model::finding::did_you_mean;
-use crate::model::statechart::{INITIAL, ROOT, Since, Transition, Trigger};
+use crate::model::statechart::{ChartTransition, INITIAL, ROOT, Since, Trigger};
 use crate::model::{EventName, codes};
 use roxmltree::Node as Element;
 use rustc_hash::FxHashSet;
 use std::collections::BTreeMap;
 
-impl<'t> Reader<'_, 't> {
+impl<'t> ScxmlReader<'_, 't> {
     /// Events that a state sends itself later, with their seconds.
     pub(super) fn delays(&mut self, element: Element<'_, 't>) -> BTreeMap<String, f64> {
         let sends = element.children().filter(|c| c.has_tag_name((SCXML, "onentry"))).flat_map(|c| c.children());
@@ -53,7 +53,7 @@ impl<'t> Reader<'_, 't> {
         fqn: &str,
         source: Element<'_, 't>,
         delays: &BTreeMap<String, f64>,
-    ) -> Option<Transition> {
+    ) -> Option<ChartTransition> {
         let origin = self.at(element);
         let Some(ids) = element.attribute("target") else {
             let help = "a transition always leads somewhere: raise the names on the entry of a state";
@@ -85,7 +85,7 @@ impl<'t> Reader<'_, 't> {
         }
         let leads_back = !self.ours && fqn.strip_prefix(&target).is_some_and(|rest| rest.starts_with('.'));
         let target = if leads_back { self.again(&target) } else { target };
-        let mut out = Transition { origin, ..Transition::default() };
+        let mut out = ChartTransition { origin, ..ChartTransition::default() };
         out.src = Some((src.to_owned(), origin));
         out.tgt = Some((target, origin));
         let events = own(element, "event").or_else(|| element.attribute("event")).unwrap_or_default();
@@ -133,7 +133,7 @@ impl<'t> Reader<'_, 't> {
         exact: bool,
         delays: &BTreeMap<String, f64>,
         known: &mut FxHashSet<String>,
-        out: &mut Transition,
+        out: &mut ChartTransition,
     ) {
         if let Some(seconds) = delays.get(event).filter(|_| !exact) {
             out.events.push((Trigger::timed(Since::Entry, *seconds), out.origin));

@@ -1,7 +1,7 @@
 //! A PID controller.
 
 use super::arithmetic::within;
-use crate::runtime::{Answer, Builder, Component, Context, In, Out, Prop};
+use crate::runtime::{Builder, Component, Context, In, OperationAnswer, Out, Prop};
 
 /// A PID controller with limits, anti-windup and a filtered derivative.
 ///
@@ -39,7 +39,7 @@ impl Component for Pid {
         b.doc("Sets the integral part to this value and forgets the derivative.").no_effect();
         b.operation("reset", |this: &mut Self, _, (integral,): (f64,)| {
             this.forget(integral);
-            Answer::Done(())
+            OperationAnswer::Done(())
         });
         Self {
             setpoint: b.doc("What is wanted.").input("setpoint"),

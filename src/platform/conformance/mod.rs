@@ -128,11 +128,15 @@ rules! {
             "A prepared step does what the same step executed does, checks its precondition as well, and takes another value where one is given.";
     several:
         several_steps_are_carried_out_as_far_as_they_are_done []
-            "Brief steps are carried out in their order; there is an answer for each that was begun, at least one, and none behind one that is not done."
+            "Several steps in one call are carried out in their order; there is an answer for each that was begun, at least one, and none begins behind one that is not done."
         several_steps_stop_where_they_are_told_to []
-            "Once it is told to stop, no second one of several brief steps begins."
+            "Once it is told to stop, no second one of several steps begins."
         several_steps_end_with_one_that_hangs [MakingHangs]
-            "Of several brief steps one that hangs is unknown at its own deadline: what comes before it is done, and nothing behind it begins.";
+            "Of several steps one that hangs is unknown at its deadline: what comes before it is done, and nothing behind it begins."
+        each_of_several_steps_has_its_own_time [MakingHangs]
+            "Each of several steps has its own time from its beginning on, whatever the others have."
+        what_is_done_is_told_before_the_end_of_others [MakingHangs]
+            "Of several steps each is answered as it ends: one that hangs keeps back no answer of those before it.";
     going_wrong:
         what_is_not_done_by_its_deadline_does_not_happen_later []
             "What was answered not to have happened does not happen later, and what was answered to have happened has."

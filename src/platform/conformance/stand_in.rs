@@ -4,7 +4,7 @@ use super::Times;
 use super::bed::{Bed, BedTrouble, UnderTest};
 use super::words::{name, types};
 use crate::model::{Catalogue, EventName};
-use crate::platform::simulated::{Delays, Fault, FaultRule, Faults, Options, Simulated, StepPattern};
+use crate::platform::simulated::{Delays, Fault, FaultRule, Faults, Simulated, SimulatedOptions, StepPattern};
 use crate::time::Clock;
 use std::sync::Arc;
 use std::time::Duration;
@@ -37,7 +37,7 @@ impl StandIn {
         let long = trouble.iter().any(|(_, trouble)| matches!(trouble, BedTrouble::Long | BedTrouble::Deaf));
         let of = if long { vec![(StepPattern::new(&pattern("work")), Times::default().work)] } else { Vec::new() };
         let delays = Delays { of, ..Delays::default() };
-        let options = Options { faults: Faults::new(rules), delays, ..Options::default() };
+        let options = SimulatedOptions { faults: Faults::new(rules), delays, ..SimulatedOptions::default() };
         let simulated = Simulated::new(catalogue, clock.clone(), options);
         let handle = simulated.clone();
         let raise = move |component: &str, event: &str| {

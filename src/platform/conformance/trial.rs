@@ -268,16 +268,25 @@ impl Trial {
     }
 
     /// Has another thread carry the step out within `limit` from now on; what it answers, and when.
-    pub fn begin(&self, step: &Step, limit: Duration) -> StepUnderWay {
+    pub fn begin(&self, step: &Step, limit: Duration) -> CallUnderWay<Outcome> {
+        let (own, deadline) = (step.clone(), self.now() + limit);
+        self.work(format!("`{step}`"), move |platform| platform.execute(&own, deadline))
+    }
+
+    /// Has another thread ask the platform something.
+    pub fn work<T: Send + 'static>(
+        &self,
+        with: String,
+        f: impl FnOnce(&dyn Platform) -> T + Send + 'static,
+    ) -> CallUnderWay<T> {
         let (answer, answered) = self.made.clock.channel(1);
-        let (platform, clock, own) = (self.made.platform.clone(), self.made.clock.clone(), step.clone());
-        let deadline = self.now() + limit;
+        let (platform, clock) = (self.made.platform.clone(), self.made.clock.clone());
         self.made.clock.spawn("conformance", move || {
-            let came = catch_unwind(AssertUnwindSafe(|| platform.execute(&own, deadline)));
+            let came = catch_unwind(AssertUnwindSafe(|| f(&*platform)));
             drop(platform);
-            let _ = answer.try_send(came.map(|outcome| (outcome, clock.now())).map_err(|p| panic_text(&*p)));
+            let _ = answer.try_send(came.map(|it| (it, clock.now())).map_err(|p| panic_text(&*p)));
         });
-        StepUnderWay { with: format!("`{step}`"), answered }
+        CallUnderWay { with, answered }
     }
 
     /// Lets so much time pass.
@@ -286,15 +295,15 @@ impl Trial {
     }
 }
 
-/// A step that another thread carries out.
-pub struct StepUnderWay {
+/// What another thread asks of a platform.
+pub struct CallUnderWay<T> {
     with: String,
-    answered: Receiver<Result<(Outcome, Time), String>>,
+    answered: Receiver<Result<(T, Time), String>>,
 }
 
-impl StepUnderWay {
-    /// How it ended, by `deadline`, and when.
-    pub fn ended(&self, deadline: Time) -> RuleEnds<(Outcome, Time)> {
+impl<T> CallUnderWay<T> {
+    /// What came of it, by `deadline`, and when.
+    pub fn ended(&self, deadline: Time) -> RuleEnds<(T, Time)> {
         match self.answered.recv_deadline(deadline) {
             Ok(Ok(it)) => Ok(it),
             Ok(Err(text)) => Err(broken(&self.with, "an answer", format_args!("the platform panicked: {text}"))),

@@ -2,15 +2,15 @@
 //! deadline; and what becomes of those that come back too late.
 
 use super::steps::{Naps, closed};
-use super::under_way::{Settled, What};
+use super::under_way::{HookSettlement, What};
 use super::workers::Job;
 use super::{Inner, Outcome};
 use crate::model::{Call as Step, RunState, Transition, Value};
 use crate::platform::{Cause, PlatformEvent};
-use crate::runtime::activity::{Activity, Request};
+use crate::runtime::activity::{ActivityThread, OperationJob};
 use crate::runtime::builder::CallerFn;
-use crate::runtime::call::{Call, Progress, Reply};
-use crate::runtime::cell::{Cell, Inside};
+use crate::runtime::call::{CallProgress, Reply, Responder};
+use crate::runtime::cell::{Cell, CellGuard};
 use crate::runtime::gate::Closed;
 use crate::runtime::guard;
 use crate::time::{Receiver, RecvError, Sender, Time, lock};
@@ -23,11 +23,11 @@ impl Inner {
         let may = |state| {
             if transition == Transition::Stop { state == RunState::Stopped } else { transition.allowed_in(state) }
         };
-        let mut inside = match Inside::idle(&**cell, safe, may) {
+        let mut inside = match CellGuard::idle(&**cell, safe, may) {
             Ok(inside) => inside.sent(cell),
             Err(why) => return Outcome::NotDone(closed(why, cell.name, transition.as_str())),
         };
-        let settled = Arc::new(Settled::default());
+        let settled = Arc::new(HookSettlement::default());
         let _entered = self.under_way.enter(What::Hook(cell.name, transition, settled.clone()));
         let (answer, answered) = self.clock.channel(1);
         let job: Job = {
@@ -69,7 +69,7 @@ impl Inner {
     fn after_hook(
         &self,
         cell: &Arc<Cell>,
-        inside: Inside<'_>,
+        inside: CellGuard<'_>,
         transition: Transition,
         result: Result<Result<(), crate::runtime::Failure>, String>,
     ) -> Outcome {
@@ -97,7 +97,7 @@ impl Inner {
                         cell.restart();
                     }
                     inside.leave(target);
-                    registry.crew_of(slot).activity.started(cell);
+                    registry.activity_of(slot).activity.started(cell);
                 }
                 Err(cause) => {
                     inside.leave(None);
@@ -125,7 +125,7 @@ impl Inner {
         }
     }
 
-    fn find_operation(&self, step: &Step, reply: Sender<Reply>, safe: bool) -> Result<Begun, Cause> {
+    fn find_operation(&self, step: &Step, reply: Sender<Reply>, safe: bool) -> Result<BegunCall, Cause> {
         let (name, operation) = (step.operation.component, step.operation.member);
         let registry = lock(&self.registry);
         let slot = registry.find(name)?;
@@ -136,16 +136,19 @@ impl Inner {
             .binary_search(&operation)
             .map_err(|_| Cause::Refused(format!("`{name}` has no operation `{operation}`")))?;
         let place = match registry.entry(slot).caller(operation) {
-            Some(function) => Place::Beside(function),
+            Some(function) => OperationExecutor::Beside(function),
             None if cell.state() == RunState::Running => {
-                let crew = registry.crew_of(slot);
-                Place::Activity(crew.requests.clone(), crew.activity.clone())
+                let scheduled = registry.activity_of(slot);
+                OperationExecutor::Activity(scheduled.requests.clone(), scheduled.activity.clone())
             }
-            None => Place::Worker,
+            None => OperationExecutor::Worker,
         };
         // Beside the component a safe call disturbs nobody, and inside it one is let in that can still come to rest.
-        let keeps_out =
-            if safe { !matches!(place, Place::Beside(_)) && cell.gate.is_lost() } else { cell.gate.is_quarantined() };
+        let keeps_out = if safe {
+            !matches!(place, OperationExecutor::Beside(_)) && cell.gate.is_lost()
+        } else {
+            cell.gate.is_quarantined()
+        };
         if keeps_out {
             return Err(Cause::Quarantined);
         }
@@ -154,20 +157,20 @@ impl Inner {
             return Err(Cause::Refused(format!("the arguments do not fit {}", step.operation)));
         }
         let (holds, wake) = match &place {
-            Place::Beside(_) => (None, None),
-            Place::Worker | Place::Activity(..) => {
-                (Some(cell.beat.clone()), Some(registry.crew_of(slot).activity.signal.clone()))
+            OperationExecutor::Beside(_) => (None, None),
+            OperationExecutor::Worker | OperationExecutor::Activity(..) => {
+                (Some(cell.beat.clone()), Some(registry.activity_of(slot).activity.signal.clone()))
             }
         };
-        let progress = Arc::new(Progress::new(reply, holds, wake));
-        Ok(Begun { cell, index, place, progress })
+        let progress = Arc::new(CallProgress::new(reply, holds, wake));
+        Ok(BegunCall { cell, index, place, progress })
     }
 
-    fn begin_operation(&self, begun: &Begun, step: &Step, deadline: Time, safe: bool) -> Result<(), Cause> {
-        let Begun { cell, index, place, progress } = begun;
+    fn begin_operation(&self, begun: &BegunCall, step: &Step, deadline: Time, safe: bool) -> Result<(), Cause> {
+        let BegunCall { cell, index, place, progress } = begun;
         let (progress, args): (_, Vec<Value>) = (progress.clone(), step.args.clone());
         match place {
-            Place::Beside(function) => {
+            OperationExecutor::Beside(function) => {
                 let function = function.clone();
                 let job = move || {
                     if progress.begin() {
@@ -178,31 +181,37 @@ impl Inner {
                 };
                 self.workers.run(Box::new(job)).map_err(Cause::Refused)
             }
-            Place::Activity(requests, activity) => {
-                let request = Request { cell: cell.clone(), operation: *index, args, call: Call(progress), safe };
+            OperationExecutor::Activity(requests, activity) => {
+                let request =
+                    OperationJob { cell: cell.clone(), operation: *index, args, call: Responder(progress), safe };
                 requests.try_send(request).map_err(|_| {
                     Cause::Refused(format!("too many operations wait for the activity `{}`", activity.name))
                 })?;
                 activity.signal.notify();
                 Ok(())
             }
-            Place::Worker => {
+            OperationExecutor::Worker => {
                 let inside = if safe || !cell.is_restless() {
                     let refused = |why| closed(why, cell.name, "call an operation of");
-                    Inside::idle(&**cell, safe, |_| true).map_err(refused)?
+                    CellGuard::idle(&**cell, safe, |_| true).map_err(refused)?
                 } else {
                     self.enter_rested(cell, &progress, deadline)?
                 };
-                self.operate_idle(inside, cell, *index, args, Call(progress))
+                self.operate_idle(inside, cell, *index, args, Responder(progress))
             }
         }
     }
 
     /// Enters a component that does not run when it has come to rest from a call that was given up; others may wait too.
-    fn enter_rested<'a>(&self, cell: &'a Cell, progress: &Progress, deadline: Time) -> Result<Inside<'a>, Cause> {
+    fn enter_rested<'a>(
+        &self,
+        cell: &'a Cell,
+        progress: &CallProgress,
+        deadline: Time,
+    ) -> Result<CellGuard<'a>, Cause> {
         let mut naps = Naps::default();
         loop {
-            match Inside::idle(cell, false, |_| true) {
+            match CellGuard::idle(cell, false, |_| true) {
                 Ok(inside) => return Ok(inside),
                 Err(Closed::Busy) if progress.is_withdrawn() => return Err(Cause::Cancelled),
                 Err(Closed::Busy) if naps.take(&self.clock, deadline) => {}
@@ -215,11 +224,11 @@ impl Inner {
     /// Calls an operation of a component that does not run, on a worker.
     fn operate_idle(
         &self,
-        inside: Inside<'_>,
+        inside: CellGuard<'_>,
         cell: &Arc<Cell>,
         index: usize,
         args: Vec<Value>,
-        call: Call,
+        call: Responder,
     ) -> Result<(), Cause> {
         let (inner, clock, own) = (self.own.clone(), self.clock.clone(), cell.clone());
         let inside = inside.sent(cell);
@@ -246,8 +255,8 @@ impl Inner {
         self.workers.run(job).map_err(Cause::Refused)
     }
 
-    fn await_answer(&self, begun: Begun, replied: Receiver<Reply>, deadline: Time) -> Outcome {
-        let Begun { cell, place, progress, .. } = begun;
+    fn await_answer(&self, begun: BegunCall, replied: Receiver<Reply>, deadline: Time) -> Outcome {
+        let BegunCall { cell, place, progress, .. } = begun;
         let reply = match replied.recv_deadline(deadline) {
             Ok(reply) => reply,
             Err(RecvError::Closed) => Reply::Failed("the component ended before it answered".to_owned()),
@@ -258,11 +267,11 @@ impl Inner {
                 }
                 progress.tell();
                 // What answers later is only late; what has not come back at all may never.
-                self.give_up(&cell, matches!(place, Place::Activity(..)), || progress.is_inside());
+                self.give_up(&cell, matches!(place, OperationExecutor::Activity(..)), || progress.is_inside());
                 match replied.try_recv() {
                     Ok(reply) => reply,
                     Err(_) => {
-                        if given_up_before && !matches!(place, Place::Beside(_)) {
+                        if given_up_before && !matches!(place, OperationExecutor::Beside(_)) {
                             self.leave_restless(&cell, &progress, replied);
                         }
                         return Outcome::Unknown(Cause::Timeout);
@@ -281,7 +290,7 @@ impl Inner {
     }
 
     /// A call that was given up has not come to rest, though its code returns: the component is in quarantine until it has.
-    fn leave_restless(&self, cell: &Arc<Cell>, progress: &Arc<Progress>, replied: Receiver<Reply>) {
+    fn leave_restless(&self, cell: &Arc<Cell>, progress: &Arc<CallProgress>, replied: Receiver<Reply>) {
         let mut registry = lock(&self.registry);
         if progress.is_answered() || progress.is_inside() {
             return;
@@ -325,7 +334,7 @@ impl Inner {
     }
 
     /// Removes a component whose call came back too late. Runs on a worker. `inside`: it is still inside.
-    fn clean_up(&self, cell: &Arc<Cell>, inside: Option<Inside<'_>>, configured: bool) {
+    fn clean_up(&self, cell: &Arc<Cell>, inside: Option<CellGuard<'_>>, configured: bool) {
         {
             // Whoever gave it up has said so under this lock.
             let registry = lock(&self.registry);
@@ -333,7 +342,7 @@ impl Inner {
                 return;
             }
         }
-        let Some(mut inside) = inside.or_else(|| Inside::returned(cell)) else { return };
+        let Some(mut inside) = inside.or_else(|| CellGuard::returned(cell)) else { return };
         if configured && cell.kind.has_hook(Transition::Cleanup) {
             let _ = inside.hook(&self.clock, Transition::Cleanup);
         }
@@ -352,19 +361,19 @@ impl Inner {
 }
 
 /// Where an operation runs.
-enum Place {
+enum OperationExecutor {
     /// In the caller's thread, beside the component.
     Beside(CallerFn),
     /// In the component's activity, between two updates.
-    Activity(Sender<Request>, Arc<Activity>),
+    Activity(Sender<OperationJob>, Arc<ActivityThread>),
     /// On a worker: the component does not run.
     Worker,
 }
 
 /// A call of an operation.
-struct Begun {
+struct BegunCall {
     cell: Arc<Cell>,
     index: usize,
-    place: Place,
-    progress: Arc<Progress>,
+    place: OperationExecutor,
+    progress: Arc<CallProgress>,
 }

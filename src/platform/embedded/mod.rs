@@ -1,15 +1,15 @@
 //! The embedded platform: components of this process, run by the embedded runtime.
 //!
-//! * [`registry`]: what is there, behind one lock that no activity ever takes; [`crews`] its activities, [`wiring`] its
+//! * [`registry`]: what is there, behind one lock that no activity ever takes; [`activities`] its activities, [`wiring`] its
 //!   ports and properties.
-//! * [`steps`]: the steps that are immediate. [`turn`], [`calls`]: those that run a component's own code, on workers under
+//! * [`steps`]: the steps that are immediate. [`step_sequence`], [`calls`]: those that run a component's own code, on workers under
 //!   a deadline; [`under_way`]: how they are given up; [`workers`]: their threads.
 //! * [`watchers`]: the probes by which monitors and conditions look at components. [`prepared`]: fixed lists of immediate steps.
 //!   [`order`]: the data-flow order.
 //!
 //! What is immediate: everything but operations, the state changes of types that declare a hook for them, and `create` and
-//! `destroy` of types that do not promise to be made and dropped at once. These two are brief; but `destroy` of a type with
-//! hooks is blocking: it may close devices. A `stop` waits until an update under way has ended, at most until its deadline.
+//! `destroy` of types that do not promise to be made and dropped at once. These two go in batches; but `destroy` of a type with
+//! hooks goes alone: it may close devices. A `stop` waits until an update under way has ended, at most until its deadline.
 //!
 //! A call of a component that has not returned by its deadline is *unknown*, the component in quarantine: it is not updated
 //! any more and every step on it is refused, but disconnecting its neighbours, and of a `safe` configuration what it writes
@@ -20,34 +20,32 @@
 //! update), also puts the component in quarantine; but that is updated on, lets all `safe` steps in, and leaves quarantine as
 //! it is when it answers.
 
+mod activities;
 mod calls;
-mod crews;
 mod order;
 mod others;
 mod prepared;
 mod registry;
+mod step_sequence;
 mod steps;
-mod turn;
 mod under_way;
 mod watchers;
 mod wiring;
 mod workers;
 
-use super::{Ended, EventSink, Execution, ObserveError, Outcome, Platform, PlatformEvent, Prepared, Watch};
+use super::{EventSink, Execution, ObserveError, Outcome, Platform, PlatformEvent, Prepared, StepBatch, Watch};
 use crate::limits;
 use crate::model::{
     Activity as Spec, ActivityStatus, Catalogue, ComponentName, ComponentSnapshot, Ident, Origin, Snapshot, Step,
     Transition, TypeName,
 };
-use crate::monitor::Input;
-use crate::runtime::{Kind, Libraries, Notice, Notices, guard};
+use crate::monitor::MonitorInput;
+use crate::runtime::{ComponentFactory, Libraries, Notice, Notices, guard};
 use crate::time::{Clock, Signal, Time, lock};
 use registry::Registry;
 use rustc_hash::FxHashMap;
 use std::collections::BTreeMap;
-use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, PoisonError, RwLock, Weak};
-use std::time::Duration;
 use under_way::UnderWay;
 use workers::Workers;
 
@@ -62,7 +60,7 @@ struct Inner {
     own: Weak<Inner>,
     clock: Clock,
     catalogue: Catalogue,
-    kinds: FxHashMap<TypeName, Arc<Kind>>,
+    kinds: FxHashMap<TypeName, Arc<ComponentFactory>>,
     activities: BTreeMap<Ident, Spec>,
     /// The activity of components that name none.
     default_activity: Ident,
@@ -132,26 +130,37 @@ impl Platform for EmbeddedPlatform {
                 if waits { Execution::Blocking } else { Execution::Immediate }
             }
             Step::Create { ty, .. } => match self.inner.kinds.get(ty) {
-                Some(kind) if !kind.is_immediate() => Execution::Brief,
+                Some(kind) if !kind.is_immediate() => Execution::Blocking,
                 _ => Execution::Immediate,
             },
             Step::Destroy { component } => {
                 let registry = lock(&self.inner.registry);
                 registry.find(*component).map_or(Execution::Immediate, |slot| {
                     let kind = &registry.entry(slot).cell.kind;
-                    match (kind.has_hooks(), kind.is_immediate()) {
-                        (true, _) => Execution::Blocking,
-                        (false, false) => Execution::Brief,
-                        (false, true) => Execution::Immediate,
-                    }
+                    if kind.is_immediate() && !kind.has_hooks() { Execution::Immediate } else { Execution::Blocking }
                 })
             }
             _ => Execution::Immediate,
         }
     }
 
-    fn execute_brief(&self, steps: Vec<Step>, each: Duration, until: Time, stop: &Arc<AtomicBool>) -> Vec<Ended> {
-        self.inner.in_turn(steps, each, until, stop)
+    fn batches(&self, step: &Step) -> bool {
+        match step {
+            Step::Create { .. } => true,
+            Step::Destroy { component } => {
+                let registry = lock(&self.inner.registry);
+                registry.find(*component).is_ok_and(|slot| !registry.entry(slot).cell.kind.has_hooks())
+            }
+            _ => false,
+        }
+    }
+
+    fn execute_batch(&self, batch: &StepBatch) {
+        let made_or_dropped = |step: &Step| matches!(step, Step::Create { .. } | Step::Destroy { .. });
+        match batch.steps().iter().all(|timed| made_or_dropped(&timed.step)) {
+            true => self.inner.in_sequence(batch),
+            false => batch.one_by_one(|step, deadline| self.inner.execute(step, deadline, batch.is_safe())),
+        }
     }
 
     fn execute(&self, step: &Step, deadline: Time) -> Outcome {
@@ -183,8 +192,8 @@ impl Platform for EmbeddedPlatform {
         prepared::prepare(&self.inner, steps)
     }
 
-    fn watch(&self, inputs: &[Input], wake: &Signal) -> Option<Box<dyn Watch>> {
-        Some(Box::new(watchers::Look::new(&self.inner, inputs, wake)))
+    fn watch(&self, inputs: &[MonitorInput], wake: &Signal) -> Option<Box<dyn Watch>> {
+        Some(Box::new(watchers::ProbeWatch::new(&self.inner, inputs, wake)))
     }
 
     fn subscribe(&self, sink: EventSink) {
@@ -208,7 +217,8 @@ impl Platform for EmbeddedPlatform {
 
     fn activities(&self) -> Vec<ActivityStatus> {
         let registry = lock(&self.inner.registry);
-        let mut list: Vec<_> = registry.crews().map(|crew| crew.activity.status(registry.cells(crew))).collect();
+        let mut list: Vec<_> =
+            registry.activities().map(|scheduled| scheduled.activity.status(registry.cells(scheduled))).collect();
         list.sort_by_key(|status| status.name);
         list
     }

@@ -8,7 +8,7 @@ use crate::platform::{Cause, Prepared};
 use crate::time::{Time, lock};
 use std::sync::Arc;
 
-struct Resolved {
+struct EmbeddedPrepared {
     inner: Arc<Inner>,
     steps: Vec<Handle>,
     waited: bool,
@@ -54,10 +54,10 @@ pub(super) fn prepare(inner: &Arc<Inner>, steps: &[Step]) -> Option<Box<dyn Prep
         handles.push(Handle { slot, number: registry.entry(slot).number, act });
     }
     drop(registry);
-    Some(Box::new(Resolved { inner: inner.clone(), steps: handles, waited: false }))
+    Some(Box::new(EmbeddedPrepared { inner: inner.clone(), steps: handles, waited: false }))
 }
 
-impl Prepared for Resolved {
+impl Prepared for EmbeddedPrepared {
     fn execute(&mut self, index: usize, value: Option<&Value>, now: Time, deadline: Time) -> Outcome {
         let Some(Handle { slot, number, act }) = self.steps.get(index) else {
             return Outcome::NotDone(Cause::Refused("there is no such prepared step".to_owned()));

@@ -1,6 +1,6 @@
 //! What is there: components, connections, activities, as the configurator's side sees them. No activity ever touches it.
 
-use super::crews::Crew;
+use super::activities::ScheduledActivity;
 use super::others::Others;
 use super::watchers::Watcher;
 use crate::model::{ComponentName, ComponentSnapshot, Direction, Ident, MemberRef, Policy, Snapshot, Value};
@@ -15,12 +15,12 @@ use std::sync::Arc;
 
 #[derive(Default)]
 pub(super) struct Registry {
-    pub(super) slots: Vec<Option<Entry>>,
+    pub(super) slots: Vec<Option<RegisteredComponent>>,
     free: Vec<u32>,
     names: FxHashMap<ByAddress<ComponentName>, u32>,
     pub(super) connections: FxHashMap<ByAddress<(MemberRef, MemberRef)>, Connection>,
     numbers: u64,
-    pub(super) crews: FxHashMap<Ident, Crew>,
+    pub(super) activities: FxHashMap<Ident, ScheduledActivity>,
     /// Threads of activities that are gone.
     pub(super) ending: Vec<Join>,
     /// Components that look at others by probes.
@@ -50,7 +50,7 @@ impl Hash for ByAddress<(MemberRef, MemberRef)> {
 }
 
 /// A component.
-pub(super) struct Entry {
+pub(super) struct RegisteredComponent {
     pub(super) cell: Arc<Cell>,
     pub(super) ends: Ends,
     /// The values of its properties, in the order of names.
@@ -59,7 +59,7 @@ pub(super) struct Entry {
     pub(super) connections: u32,
     /// The activity it was created in, and the one it runs in.
     asked: Option<Ident>,
-    pub(super) crew: Ident,
+    pub(super) runs_in: Ident,
     /// Its place among the members of the activity.
     pub(super) place: u32,
     /// No other component ever has it.
@@ -86,7 +86,7 @@ pub(super) fn refused<T>(text: String) -> Result<T, Cause> {
     Err(Cause::Refused(text))
 }
 
-impl Entry {
+impl RegisteredComponent {
     /// The function of an operation that runs in the caller's thread.
     pub(super) fn caller(&self, operation: Ident) -> Option<CallerFn> {
         self.ends.callers.iter().find(|(name, _)| *name == operation).map(|(_, f)| f.clone())
@@ -114,11 +114,11 @@ impl Registry {
     }
 
     /// The component in a slot that [`Registry::find`] gave, under the same lock.
-    pub(super) fn entry(&self, slot: u32) -> &Entry {
+    pub(super) fn entry(&self, slot: u32) -> &RegisteredComponent {
         self.slots[slot as usize].as_ref().expect("a slot found under this lock is taken")
     }
 
-    pub(super) fn entry_mut(&mut self, slot: u32) -> &mut Entry {
+    pub(super) fn entry_mut(&mut self, slot: u32) -> &mut RegisteredComponent {
         self.slots[slot as usize].as_mut().expect("a slot found under this lock is taken")
     }
 
@@ -140,7 +140,7 @@ impl Registry {
         mut ends: Ends,
         values: Vec<Value>,
         asked: Option<Ident>,
-        crew: Ident,
+        runs_in: Ident,
     ) {
         let probes = ends.probes.take();
         let number = self.next_number();
@@ -148,17 +148,17 @@ impl Registry {
             self.slots.push(None);
             u32::try_from(self.slots.len() - 1).expect("fewer than 2^32 components")
         });
-        let members = &mut self.crews.get_mut(&crew).expect("made before its first component").members;
+        let members = &mut self.activities.get_mut(&runs_in).expect("made before its first component").members;
         let place = u32::try_from(members.len()).expect("fewer than 2^32 components");
         members.push(Some(slot));
-        if let Some(crew) = self.crews.get_mut(&crew) {
-            crew.unpublished = true;
+        if let Some(scheduled) = self.activities.get_mut(&runs_in) {
+            scheduled.unpublished = true;
         }
         let mut ports = Vec::with_capacity(ends.ports.len());
         ports.resize_with(ends.ports.len(), PortUse::default);
         self.names.insert(ByAddress(cell.name), slot);
         self.slots[slot as usize] =
-            Some(Entry { cell, ends, values, ports, connections: 0, asked, crew, place, number });
+            Some(RegisteredComponent { cell, ends, values, ports, connections: 0, asked, runs_in, place, number });
         if !self.watchers.is_empty() {
             self.show(slot);
         }
@@ -194,21 +194,21 @@ impl Registry {
     }
 
     /// Takes a component without connections out.
-    pub(super) fn remove(&mut self, slot: u32) -> Entry {
+    pub(super) fn remove(&mut self, slot: u32) -> RegisteredComponent {
         if !self.watchers.is_empty() {
             self.hide(slot);
         }
         let entry = self.slots[slot as usize].take().expect("a slot found under this lock is taken");
         self.free.push(slot);
         self.names.remove(&ByAddress(entry.cell.name));
-        if let Some(crew) = self.crews.get_mut(&entry.crew) {
-            crew.members[entry.place as usize] = None;
-            crew.holes += 1;
-            if crew.holes == crew.members.len() {
-                self.end_if_empty(entry.crew);
-            } else if crew.holes > 16 + crew.members.len() / 2 {
+        if let Some(scheduled) = self.activities.get_mut(&entry.runs_in) {
+            scheduled.members[entry.place as usize] = None;
+            scheduled.holes += 1;
+            if scheduled.holes == scheduled.members.len() {
+                self.end_if_empty(entry.runs_in);
+            } else if scheduled.holes > 16 + scheduled.members.len() / 2 {
                 // The activity holds on to what is in its list: from time to time it gets one without the dead.
-                let name = entry.crew;
+                let name = entry.runs_in;
                 self.publish(name);
             }
         }
@@ -226,11 +226,11 @@ impl Registry {
     }
 
     /// The activities' threads and the components, to be taken down.
-    pub(super) fn clear(&mut self) -> (Vec<Join>, Vec<Entry>) {
+    pub(super) fn clear(&mut self) -> (Vec<Join>, Vec<RegisteredComponent>) {
         let mut threads = std::mem::take(&mut self.ending);
-        for (_, crew) in self.crews.drain() {
-            crew.activity.end();
-            threads.extend(crew.thread);
+        for (_, scheduled) in self.activities.drain() {
+            scheduled.activity.end();
+            threads.extend(scheduled.thread);
         }
         self.names.clear();
         self.connections.clear();
@@ -278,7 +278,7 @@ impl Registry {
 }
 
 /// Adds the values written to a component's ports.
-fn written(entry: &Entry, ports: &mut BTreeMap<MemberRef, Value>) {
+fn written(entry: &RegisteredComponent, ports: &mut BTreeMap<MemberRef, Value>) {
     for (port, used) in entry.cell.kind.ports.iter().zip(&entry.ports) {
         if used.written
             && let Some(value) = &used.value

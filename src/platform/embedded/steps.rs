@@ -1,9 +1,9 @@
-//! Carrying out steps: the immediate ones here, the others by [`turn`](super::turn) and [`calls`](super::calls).
+//! Carrying out steps: the immediate ones here, the others by [`step_sequence`](super::step_sequence) and [`calls`](super::calls).
 
 use super::registry::Registry;
 use super::{Inner, Outcome};
 use crate::model::{ComponentName, Policy, RunState, Step, Transition};
-use crate::platform::{Cause, PlatformEvent};
+use crate::platform::{Cause, PlatformEvent, StepBatch, TimedStep};
 use crate::runtime::cell::Cell;
 use crate::runtime::gate::Closed;
 use crate::time::{Clock, Time, lock};
@@ -63,9 +63,10 @@ impl Inner {
             Step::Create { ty, .. } if self.kinds.get(ty).is_none_or(|kind| kind.is_immediate()) => self.at_once(step),
             Step::Destroy { component } if self.is_dropped_at_once(*component) => self.at_once(step),
             Step::Create { .. } | Step::Destroy { .. } => {
-                let each = deadline.since(self.clock.now());
-                let mut ended = self.in_turn(vec![step.clone()], each, deadline, &Arc::default());
-                ended.pop().map_or(Outcome::Unknown(Cause::Timeout), |ended| ended.outcome)
+                let alone = TimedStep { step: step.clone(), patience: Duration::MAX, until: deadline };
+                let batch = StepBatch::new(self.clock.clone(), vec![alone]);
+                self.in_sequence(&batch);
+                batch.take(true).pop().map_or(Outcome::Unknown(Cause::Timeout), |answer| answer.outcome)
             }
             Step::Connect { from, to, policy } => outcome(self.connect(*from, *to, *policy)),
             Step::Disconnect { from, to } => outcome(lock(&self.registry).disconnect(*from, *to)),
@@ -133,8 +134,8 @@ impl Inner {
         }
         cell.gate.shift(transition, safe).map_err(|why| closed(why, cell.name, transition.as_str()))?;
         match transition {
-            Transition::Start => registry.crew_of(slot).activity.started(cell),
-            Transition::Stop => registry.crew_of(slot).activity.stopped(cell),
+            Transition::Start => registry.activity_of(slot).activity.started(cell),
+            Transition::Stop => registry.activity_of(slot).activity.stopped(cell),
             Transition::Configure | Transition::Cleanup => {}
         }
         Ok(())
@@ -176,7 +177,7 @@ impl Inner {
         let Some(was_running) = (if really() { cell.gate.quarantine() } else { None }) else { return false };
         registry.quarantined.insert(cell.name);
         let stuck = registry.find(cell.name).ok().map(|slot| {
-            let activity = &registry.crew_of(slot).activity;
+            let activity = &registry.activity_of(slot).activity;
             if was_running {
                 activity.running.fetch_sub(1, Ordering::SeqCst);
             }

@@ -1,26 +1,26 @@
 //! The calls that are under way, so that they can be given up from another thread.
 
-use super::turn::Turn;
+use super::step_sequence::StepSequence;
 use crate::model::{Call, ComponentName, Step, Transition};
-use crate::runtime::call::Progress;
+use crate::runtime::call::CallProgress;
 use crate::time::lock;
 use std::sync::atomic::{AtomicU8, Ordering};
 use std::sync::{Arc, Mutex};
 
 /// A call under way, as far as it can be given up.
 pub(super) enum What {
-    Operation(Call, Arc<Progress>),
+    Operation(Call, Arc<CallProgress>),
     /// Once begun a hook cannot be told anything.
-    Hook(ComponentName, Transition, Arc<Settled>),
+    Hook(ComponentName, Transition, Arc<HookSettlement>),
     /// Steps that make or drop components: those not begun are taken back.
-    Turn(Arc<Turn>),
+    Sequence(Arc<StepSequence>),
 }
 
 /// Who settles a hook: its worker by answering, or its caller by giving up. Exactly one does.
 #[derive(Default)]
-pub(super) struct Settled(AtomicU8);
+pub(super) struct HookSettlement(AtomicU8);
 
-impl Settled {
+impl HookSettlement {
     const QUEUED: u8 = 0;
     const BEGUN: u8 = 1;
     const SETTLED: u8 = 2;
@@ -46,10 +46,10 @@ impl Settled {
 }
 
 #[derive(Default)]
-pub(super) struct UnderWay(Mutex<Calls>);
+pub(super) struct UnderWay(Mutex<OutstandingCalls>);
 
 #[derive(Default)]
-struct Calls {
+struct OutstandingCalls {
     list: Vec<(u64, What)>,
     numbers: u64,
 }
@@ -74,7 +74,7 @@ impl UnderWay {
                 {
                     settled.withdraw();
                 }
-                (What::Turn(turn), Step::Create { .. } | Step::Destroy { .. }) => turn.take_back(step),
+                (What::Sequence(sequence), Step::Create { .. } | Step::Destroy { .. }) => sequence.take_back(step),
                 _ => {}
             }
         }

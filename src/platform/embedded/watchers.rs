@@ -4,11 +4,11 @@
 use super::Inner;
 use super::registry::Registry;
 use crate::model::{ComponentName, Direction, Ident, MemberRef};
-use crate::monitor::{Input, Sample};
+use crate::monitor::{InputSample, MonitorInput};
 use crate::platform::Watch;
 use crate::runtime::beat::{Beat, Notices};
 use crate::runtime::builder::PortEnd;
-use crate::runtime::links::Sender;
+use crate::runtime::links::LinksSender;
 use crate::runtime::probe::{Observed, Probe, ProbeTap, Probes, ProbesEnd};
 use crate::runtime::sight::Sight;
 use crate::time::{Signal, Time, lock};
@@ -22,13 +22,13 @@ pub(super) struct Watcher {
     name: Option<ComponentName>,
     wanted: Arc<[Observed]>,
     places: FxHashMap<Observed, usize>,
-    sender: Sender<(usize, Probe)>,
+    sender: LinksSender<(usize, Probe)>,
     wake: Option<Arc<Beat>>,
-    given: Vec<Given>,
+    given: Vec<InstalledProbe>,
 }
 
 /// A probe that is in place.
-struct Given {
+struct InstalledProbe {
     number: u64,
     place: usize,
     /// The out-port it is a link of.
@@ -42,7 +42,7 @@ impl Watcher {
     }
 
     /// Takes away the probes for which `gone` is true; answers the links they were.
-    fn take(&mut self, gone: impl Fn(&Given, &Observed) -> bool) -> Vec<(u64, MemberRef)> {
+    fn take(&mut self, gone: impl Fn(&InstalledProbe, &Observed) -> bool) -> Vec<(u64, MemberRef)> {
         let mut links = Vec::new();
         let (sender, wanted) = (&mut self.sender, &self.wanted);
         self.given.retain(|given| {
@@ -100,15 +100,15 @@ impl Registry {
 
     fn show_to(&mut self, watcher: usize, slot: u32) {
         let entry = self.entry(slot);
-        let (cell, crew) = (entry.cell.clone(), entry.crew);
+        let (cell, runs_in) = (entry.cell.clone(), entry.runs_in);
         if let Some(place) = self.watchers[watcher].place(&Observed::Component(cell.name)) {
             self.give(watcher, place, None, Probe::Component(cell.clone()));
         }
-        if let Some(place) = self.watchers[watcher].place(&Observed::Activity(crew))
+        if let Some(place) = self.watchers[watcher].place(&Observed::Activity(runs_in))
             && self.watchers[watcher].given.iter().all(|given| given.place != place)
-            && let Some(crew) = self.crews.get(&crew)
+            && let Some(scheduled) = self.activities.get(&runs_in)
         {
-            let activity = crew.activity.clone();
+            let activity = scheduled.activity.clone();
             self.give(watcher, place, None, Probe::Activity(activity));
         }
         for (index, port) in cell.kind.ports.iter().enumerate() {
@@ -157,7 +157,7 @@ impl Registry {
         self.take_probes(|_, wanted| *wanted == Observed::Activity(name));
     }
 
-    fn take_probes(&mut self, gone: impl Fn(&Given, &Observed) -> bool) {
+    fn take_probes(&mut self, gone: impl Fn(&InstalledProbe, &Observed) -> bool) {
         for watcher in 0..self.watchers.len() {
             let links = self.watchers[watcher].take(&gone);
             self.detach(links);
@@ -193,22 +193,22 @@ impl Registry {
 
     fn give_as(&mut self, watcher: usize, place: usize, number: u64, at: Option<MemberRef>, probe: Probe) {
         let watcher = &mut self.watchers[watcher];
-        watcher.given.push(Given { number, place, at });
+        watcher.given.push(InstalledProbe { number, place, at });
         watcher.sender.add(number, (place, probe));
     }
 }
 
 /// A look from outside, by probes of its own.
-pub(super) struct Look {
+pub(super) struct ProbeWatch {
     inner: Weak<Inner>,
     number: u64,
     sight: Sight,
     probes: Probes,
 }
 
-impl Look {
+impl ProbeWatch {
     /// Begins one; `wake` hears of what is written.
-    pub(super) fn new(inner: &Arc<Inner>, inputs: &[Input], wake: &Signal) -> Self {
+    pub(super) fn new(inner: &Arc<Inner>, inputs: &[MonitorInput], wake: &Signal) -> Self {
         let sight = Sight::of(inputs);
         // Nothing is ever raised in this name.
         let name = ComponentName::new("davit").expect("a plain name");
@@ -219,17 +219,17 @@ impl Look {
     }
 }
 
-impl Watch for Look {
+impl Watch for ProbeWatch {
     fn shows(&self, _: usize) -> bool {
         true
     }
 
-    fn look(&mut self, now: Time, samples: &mut [Sample]) {
+    fn look(&mut self, now: Time, samples: &mut [InputSample]) {
         self.sight.look(&mut self.probes, now, samples);
     }
 }
 
-impl Drop for Look {
+impl Drop for ProbeWatch {
     fn drop(&mut self) {
         if let Some(inner) = self.inner.upgrade() {
             lock(&inner.registry).unwatch(self.number);

@@ -71,10 +71,10 @@ impl Registry {
             self.show_connection(from, to);
         }
         let (writer, reader) = (self.entry(writer), self.entry(reader));
-        if writer.crew == reader.crew && writer.place > reader.place {
-            let name = writer.crew;
-            if let Some(crew) = self.crews.get_mut(&name) {
-                crew.disordered = true;
+        if writer.runs_in == reader.runs_in && writer.place > reader.place {
+            let name = writer.runs_in;
+            if let Some(scheduled) = self.activities.get_mut(&name) {
+                scheduled.disordered = true;
             }
             self.reorder_if_running(name);
         }
@@ -104,12 +104,12 @@ impl Registry {
         entry.ports[in_port].others.forget(from);
         entry.ports[in_port].data = false;
         entry.connections -= 1;
-        let name = entry.crew;
-        if self.entry(writer).crew == name
-            && let Some(crew) = self.crews.get_mut(&name)
-            && crew.looped
+        let name = entry.runs_in;
+        if self.entry(writer).runs_in == name
+            && let Some(scheduled) = self.activities.get_mut(&name)
+            && scheduled.looped
         {
-            crew.disordered = true;
+            scheduled.disordered = true;
             self.reorder_if_running(name);
         }
         Ok(())

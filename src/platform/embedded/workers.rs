@@ -17,19 +17,19 @@ struct Task {
 
 pub(super) struct Workers {
     clock: Clock,
-    shared: Arc<Shared>,
+    shared: Arc<IdleWorkers>,
     threads: Mutex<Vec<Join>>,
 }
 
 #[derive(Default)]
-struct Shared {
+struct IdleWorkers {
     /// The ways to those who are free; none: closed.
     free: Mutex<Option<Vec<Sender<Task>>>>,
 }
 
 impl Workers {
     pub(super) fn new(clock: &Clock) -> Self {
-        let shared = Arc::new(Shared { free: Mutex::new(Some(Vec::new())) });
+        let shared = Arc::new(IdleWorkers { free: Mutex::new(Some(Vec::new())) });
         Self { clock: clock.clone(), shared, threads: Mutex::new(Vec::new()) }
     }
 

@@ -1,6 +1,6 @@
 //! The calls that take time: what is under way, what was given up, what waits until a component has come to rest.
 
-use super::{Shared, State};
+use super::{SimulatedInner, SimulatedState};
 use crate::model::{ComponentName, Step};
 use crate::platform::{Cause, Outcome};
 use crate::time::{Receiver, Sender, Time};
@@ -47,14 +47,14 @@ impl Calls {
 
 /// One's own call, in the list until this is dropped.
 pub(super) struct Own<'a> {
-    shared: &'a Shared,
+    shared: &'a SimulatedInner,
     number: u64,
     woken: Receiver<()>,
 }
 
 impl<'a> Own<'a> {
     /// Enters a call that has not begun yet.
-    pub fn enter(shared: &'a Shared, step: &Step, deaf: bool) -> Self {
+    pub fn enter(shared: &'a SimulatedInner, step: &Step, deaf: bool) -> Self {
         let (wake, woken) = shared.clock.channel(1);
         let calls = &mut shared.lock().calls;
         calls.numbers += 1;
@@ -71,7 +71,7 @@ impl<'a> Own<'a> {
         loop {
             {
                 let mut state = self.shared.lock();
-                let State { calls, quarantine, .. } = &mut *state;
+                let SimulatedState { calls, quarantine, .. } = &mut *state;
                 let Some(at) = calls.list.iter().position(|call| call.number == self.number) else { return Ok(()) };
                 let (step, told) = (&calls.list[at].step, calls.list[at].told);
                 let component = step.component();

@@ -14,18 +14,18 @@ pub use faults::{Delays, Fault, FaultRule, Faults, Reaction, When};
 
 use super::{Cause, EventSink, Execution, ObserveError, Outcome, Platform, PlatformEvent, Prepared, Watch};
 use crate::model::{Catalogue, ComponentName, ComponentSnapshot, EventName, Ident, RunState, Snapshot, Step, Value};
-use crate::monitor::{Input, Sample, state_value};
+use crate::monitor::{InputSample, MonitorInput, state_value};
 use crate::time::{Clock, Join, RecvError, Sender, Signal, Time, TrySendError};
 use calls::Calls;
 use faults::Chance;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::Duration;
-use world::World;
+use world::SimulatedWorld;
 
 /// How a simulated platform is made.
 #[derive(Debug, Clone, Default)]
-pub struct Options {
+pub struct SimulatedOptions {
     /// What goes wrong.
     pub faults: Faults,
     /// How long steps take.
@@ -41,17 +41,17 @@ pub struct Options {
 /// The simulated platform. A cheap handle: clones are the same platform.
 #[derive(Clone)]
 pub struct Simulated {
-    shared: Arc<Shared>,
+    shared: Arc<SimulatedInner>,
 }
 
-struct Shared {
+struct SimulatedInner {
     clock: Clock,
     catalogue: Catalogue,
-    state: Mutex<State>,
+    state: Mutex<SimulatedState>,
 }
 
-struct State {
-    world: World,
+struct SimulatedState {
+    world: SimulatedWorld,
     faults: Faults,
     fired: Vec<u32>,
     asked: u64,
@@ -78,9 +78,9 @@ enum Due {
 /// burst, and what does not fit happens immediately instead of being lost.
 const DUE_QUEUE: usize = 4096;
 
-impl Shared {
+impl SimulatedInner {
     // A panic while the lock is held is a defect of this file; the data are plain, so others may go on.
-    fn lock(&self) -> MutexGuard<'_, State> {
+    fn lock(&self) -> MutexGuard<'_, SimulatedState> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -141,7 +141,7 @@ impl Shared {
     }
 }
 
-impl State {
+impl SimulatedState {
     /// The fault that hits the step asked for now, if one does, and how long it takes, if it is slow.
     fn fault(&mut self, step: &Step) -> (Option<Fault>, Option<Duration>) {
         self.asked += 1;
@@ -198,10 +198,10 @@ impl State {
 
 impl Simulated {
     /// A platform with nothing on it.
-    pub fn new(catalogue: Catalogue, clock: Clock, options: Options) -> Self {
+    pub fn new(catalogue: Catalogue, clock: Clock, options: SimulatedOptions) -> Self {
         let chance = Chance(options.faults.seed);
-        let state = State {
-            world: World::new(catalogue.clone(), options.activities),
+        let state = SimulatedState {
+            world: SimulatedWorld::new(catalogue.clone(), options.activities),
             fired: vec![0; options.faults.rules.len()],
             faults: options.faults,
             asked: 0,
@@ -215,7 +215,7 @@ impl Simulated {
             timers: None,
             calls: Calls::default(),
         };
-        Self { shared: Arc::new(Shared { clock, catalogue, state: Mutex::new(state) }) }
+        Self { shared: Arc::new(SimulatedInner { clock, catalogue, state: Mutex::new(state) }) }
     }
 
     /// The clock it runs on.
@@ -332,11 +332,14 @@ impl Platform for Simulated {
         let fixed = |step: &Step| {
             !matches!(step, Step::Create { .. } | Step::Destroy { .. }) && self.execution(step) == Execution::Immediate
         };
-        steps.iter().all(fixed).then(|| Box::new(Resolved { platform: self.clone(), steps: steps.to_vec() }) as _)
+        steps
+            .iter()
+            .all(fixed)
+            .then(|| Box::new(SimulatedPrepared { platform: self.clone(), steps: steps.to_vec() }) as _)
     }
 
     /// Its components have no code that writes anything: run states can be seen, values cannot.
-    fn watch(&self, inputs: &[Input], _: &Signal) -> Option<Box<dyn Watch>> {
+    fn watch(&self, inputs: &[MonitorInput], _: &Signal) -> Option<Box<dyn Watch>> {
         Some(Box::new(States { shared: Arc::downgrade(&self.shared), inputs: inputs.to_vec() }))
     }
 
@@ -350,7 +353,7 @@ impl Platform for Simulated {
 }
 
 impl Simulated {
-    fn see(&self, deadline: Time) -> Result<MutexGuard<'_, State>, ObserveError> {
+    fn see(&self, deadline: Time) -> Result<MutexGuard<'_, SimulatedState>, ObserveError> {
         let state = self.shared.lock();
         if state.faults.blind {
             drop(state);
@@ -362,12 +365,12 @@ impl Simulated {
 }
 
 /// A prepared list: here, simply the list.
-struct Resolved {
+struct SimulatedPrepared {
     platform: Simulated,
     steps: Vec<Step>,
 }
 
-impl Prepared for Resolved {
+impl Prepared for SimulatedPrepared {
     fn execute(&mut self, index: usize, value: Option<&Value>, _: Time, deadline: Time) -> Outcome {
         match self.steps.get(index) {
             Some(step) => self.platform.execute(step, value, deadline, false),
@@ -378,26 +381,26 @@ impl Prepared for Resolved {
 
 /// A look at run states.
 struct States {
-    shared: Weak<Shared>,
-    inputs: Vec<Input>,
+    shared: Weak<SimulatedInner>,
+    inputs: Vec<MonitorInput>,
 }
 
 impl Watch for States {
     fn shows(&self, input: usize) -> bool {
-        matches!(self.inputs[input], Input::State(_) | Input::Faulted(_))
+        matches!(self.inputs[input], MonitorInput::State(_) | MonitorInput::Faulted(_))
     }
 
-    fn look(&mut self, now: Time, samples: &mut [Sample]) {
+    fn look(&mut self, now: Time, samples: &mut [InputSample]) {
         let Some(shared) = self.shared.upgrade() else { return };
         let state = shared.lock();
         for (sample, input) in samples.iter_mut().zip(&self.inputs) {
             let state = |name: &ComponentName| state.world.components.get(name).map(|it| it.state);
             let value = match input {
-                Input::State(name) => state(name).map(state_value),
-                Input::Faulted(name) => state(name).map(|state| f64::from(u8::from(state == RunState::Faulted))),
-                Input::Port(_) | Input::Activity { .. } => None,
+                MonitorInput::State(name) => state(name).map(state_value),
+                MonitorInput::Faulted(name) => state(name).map(|state| f64::from(u8::from(state == RunState::Faulted))),
+                MonitorInput::Port(_) | MonitorInput::Activity { .. } => None,
             };
-            *sample = Sample { value: value.unwrap_or_default(), at: now, writes: 0, present: value.is_some() };
+            *sample = InputSample { value: value.unwrap_or_default(), at: now, writes: 0, present: value.is_some() };
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Carrying out a step: what it does to the world, how long it takes, what goes wrong with it.
 
 use super::calls::Own;
-use super::{Due, Fault, Simulated, State};
+use super::{Due, Fault, Simulated, SimulatedState};
 use crate::model::{ComponentName, EventName, Step, Value};
 use crate::platform::{Cause, Outcome};
 use crate::time::Time;
@@ -99,7 +99,7 @@ impl Simulated {
         Self::now(&mut state, step)
     }
 
-    fn now(state: &mut State, step: &Step) -> Outcome {
+    fn now(state: &mut SimulatedState, step: &Step) -> Outcome {
         match state.world.check(step) {
             Err(why) => Outcome::NotDone(Cause::Refused(why)),
             Ok(()) => {

@@ -13,7 +13,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 /// A component as the platform keeps it.
-pub(super) struct Component {
+pub(super) struct SimulatedComponent {
     pub ty: Arc<ComponentType>,
     pub activity: Option<Ident>,
     pub state: RunState,
@@ -23,11 +23,11 @@ pub(super) struct Component {
 }
 
 /// Everything there is.
-pub(super) struct World {
+pub(super) struct SimulatedWorld {
     pub catalogue: Catalogue,
     /// Activities that exist; none: any name is accepted.
     pub activities: Option<BTreeSet<Ident>>,
-    pub components: BTreeMap<ComponentName, Component>,
+    pub components: BTreeMap<ComponentName, SimulatedComponent>,
     connections: BTreeMap<(MemberRef, MemberRef), Policy>,
     /// In-port → the out-ports connected to it.
     incoming: BTreeMap<MemberRef, Vec<MemberRef>>,
@@ -36,9 +36,9 @@ pub(super) struct World {
     written: BTreeMap<MemberRef, Value>,
 }
 
-type Refusal = String;
+type RefusalText = String;
 
-impl World {
+impl SimulatedWorld {
     pub fn new(catalogue: Catalogue, activities: Option<BTreeSet<Ident>>) -> Self {
         Self {
             catalogue,
@@ -51,11 +51,11 @@ impl World {
         }
     }
 
-    fn component(&self, name: ComponentName) -> Result<&Component, Refusal> {
+    fn component(&self, name: ComponentName) -> Result<&SimulatedComponent, RefusalText> {
         self.components.get(&name).ok_or_else(|| format!("there is no component `{name}`"))
     }
 
-    fn port(&self, port: MemberRef, direction: Direction) -> Result<&PortType, Refusal> {
+    fn port(&self, port: MemberRef, direction: Direction) -> Result<&PortType, RefusalText> {
         let component = self.component(port.component)?;
         let ty = component.ty.ports.get(&port.member).ok_or_else(|| format!("there is no port `{port}`"))?;
         if ty.direction == direction {
@@ -66,7 +66,7 @@ impl World {
     }
 
     /// Whether `step` may happen now.
-    pub fn check(&self, step: &Step) -> Result<(), Refusal> {
+    pub fn check(&self, step: &Step) -> Result<(), RefusalText> {
         match step {
             Step::State { component, transition } => {
                 let state = self.component(*component)?.state;
@@ -141,7 +141,7 @@ impl World {
         ty: crate::model::TypeName,
         activity: Option<Ident>,
         properties: &[Value],
-    ) -> Result<(), Refusal> {
+    ) -> Result<(), RefusalText> {
         if self.components.contains_key(&component) {
             return Err(format!("`{component}` exists already"));
         }
@@ -162,7 +162,7 @@ impl World {
         Ok(())
     }
 
-    fn check_connect(&self, from: MemberRef, to: MemberRef, policy: Policy) -> Result<(), Refusal> {
+    fn check_connect(&self, from: MemberRef, to: MemberRef, policy: Policy) -> Result<(), RefusalText> {
         let out = self.port(from, Direction::Out)?;
         let into = self.port(to, Direction::In)?;
         if out.ty != into.ty {
@@ -208,7 +208,7 @@ impl World {
                 let properties = ty.properties.keys().copied().zip(properties.iter().cloned()).collect();
                 self.components.insert(
                     *component,
-                    Component { ty, activity: *activity, state: RunState::Unconfigured, properties, links: 0 },
+                    SimulatedComponent { ty, activity: *activity, state: RunState::Unconfigured, properties, links: 0 },
                 );
             }
             Step::Destroy { component } => {
@@ -303,7 +303,7 @@ impl World {
     }
 }
 
-fn exactly(value: &Value, ty: &ValueType) -> Result<(), Refusal> {
+fn exactly(value: &Value, ty: &ValueType) -> Result<(), RefusalText> {
     if value.is_of(ty) {
         Ok(())
     } else {

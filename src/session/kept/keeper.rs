@@ -6,7 +6,7 @@ use super::story::Story;
 use super::{Began, LifeEnd, boot, file, log_file, prepared};
 use crate::limits;
 use crate::session::log::LogEntry;
-use crate::session::tap::{Hears, News, Tap};
+use crate::session::tap::{LogSink, News, Tap};
 use crate::session::{Ended, NotUp};
 use crate::time::{Clock, Wall, lock};
 use serde_json::{Value as Json, json};
@@ -102,7 +102,7 @@ impl Keeper {
     }
 
     /// What to give to the session.
-    pub fn observer(&self) -> Arc<dyn Hears> {
+    pub fn observer(&self) -> Arc<dyn LogSink> {
         Arc::new(self.tap.clone())
     }
 

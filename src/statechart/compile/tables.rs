@@ -6,7 +6,7 @@ use crate::model::finding::{self, Finding, Origin};
 use crate::model::names::EventName;
 use crate::model::statechart::{Action, FunctionId, ROOT, Since, Trigger};
 use crate::statechart::chart::{
-    ActionOp, Chart, EdgeRow, EventId, Kind, NONE, NodeRow, RaiseSite, Span, TimerRow, When,
+    ActionOp, Chart, EdgeRow, EventId, NONE, NodeKind, NodeRow, RaiseMoment, RaiseSite, Span, TimerRow,
 };
 use crate::statechart::reactions::ReactionTable;
 use crate::statechart::wide::Wide;
@@ -104,7 +104,7 @@ impl ChartBuilder<'_> {
                 let Some(name) = self.name_of(trigger, src) else { continue };
                 let event = self.intern(name, *origin);
                 let Trigger::Timed(timed) = trigger else { continue };
-                if self.kinds[src as usize] == Kind::Connector {
+                if self.kinds[src as usize] == NodeKind::Connector {
                     self.findings.push(
                         Finding::warning(
                             codes::CHART_TIMER_AT_CONNECTOR,
@@ -165,7 +165,7 @@ impl ChartBuilder<'_> {
         }
         chart.triggers[first_event as usize..].sort_unstable();
         let edge = EdgeId(len(&chart.edges));
-        let effect = self.actions(&transition.effect, When::Effect(edge));
+        let effect = self.actions(&transition.effect, RaiseMoment::Effect(edge));
         let guard = transition.guard.map(|(function, _)| function);
         let predicates = Span { start: first_predicate, len: len(&chart.predicates) - first_predicate };
         chart.unguarded &= guard.is_none() && predicates.len == 0;
@@ -199,7 +199,7 @@ impl ChartBuilder<'_> {
         a
     }
 
-    fn actions(&mut self, actions: &[(Action, Origin)], when: When) -> Span {
+    fn actions(&mut self, actions: &[(Action, Origin)], when: RaiseMoment) -> Span {
         let start = len(&self.ops);
         for (action, origin) in actions {
             match action {
@@ -210,7 +210,7 @@ impl ChartBuilder<'_> {
         Span { start, len: len(&self.ops) - start }
     }
 
-    fn raise(&mut self, name: EventName, when: When, scoped: bool, origin: Origin) {
+    fn raise(&mut self, name: EventName, when: RaiseMoment, scoped: bool, origin: Origin) {
         self.ops.push(if scoped { ActionOp::RaiseScoped(name) } else { ActionOp::Raise(name) });
         self.raises.push(RaiseSite { name, when, scoped, origin });
     }
@@ -220,20 +220,20 @@ impl ChartBuilder<'_> {
         let kind = self.kinds[node];
         let (mut entry, mut exit, mut doo) = (Span::default(), Span::default(), None);
         if let Some(state) = self.states[node] {
-            entry = self.actions(&state.entry, When::Entry(NodeId(id)));
+            entry = self.actions(&state.entry, RaiseMoment::Entry(NodeId(id)));
             for (config, origin) in &state.config {
                 let name = EventName::new(config.as_str()).expect("a configuration's name is an event's");
-                self.raise(name, When::Entry(NodeId(id)), true, *origin);
+                self.raise(name, RaiseMoment::Entry(NodeId(id)), true, *origin);
             }
             entry.len = len(&self.ops) - entry.start;
             exit.start = len(&self.ops);
             for (config, origin) in state.config.iter().rev() {
                 let name = EventName::new(&format!("{config}.undo")).expect("a configuration's name is an event's");
-                self.raise(name, When::Exit(NodeId(id)), true, *origin);
+                self.raise(name, RaiseMoment::Exit(NodeId(id)), true, *origin);
             }
-            self.actions(&state.exit, When::Exit(NodeId(id)));
+            self.actions(&state.exit, RaiseMoment::Exit(NodeId(id)));
             exit.len = len(&self.ops) - exit.start;
-            doo = state.doo.map(|(function, _): (FunctionId, Origin)| function).filter(|_| kind == Kind::Leaf);
+            doo = state.doo.map(|(function, _): (FunctionId, Origin)| function).filter(|_| kind == NodeKind::Leaf);
         }
         NodeRow {
             parent: if node == 0 { 0 } else { self.parents[node] },
@@ -254,12 +254,12 @@ impl ChartBuilder<'_> {
         for (index, name) in self.events.iter().enumerate() {
             let Some(path) = name.as_str().strip_prefix("e_done@") else { continue };
             let node = self.exactly(path);
-            if let Some(node) = node.filter(|node| self.kinds[*node as usize] == Kind::Leaf) {
+            if let Some(node) = node.filter(|node| self.kinds[*node as usize] == NodeKind::Leaf) {
                 chart.nodes[node as usize].done = EventId(u32::try_from(index).expect("fewer events than ids"));
                 continue;
             }
             let why = match node {
-                Some(node) if self.kinds[node as usize] == Kind::Composite => {
+                Some(node) if self.kinds[node as usize] == NodeKind::Composite => {
                     "is a state with states in it, and those never complete"
                 }
                 Some(_) => "is a connector",
@@ -268,7 +268,7 @@ impl ChartBuilder<'_> {
             let origin = self.event_origins[index];
             // What is not shown needs no list of all states.
             let leaves: Vec<String> = (0..len(&self.names))
-                .filter(|n| self.lookup().suggests && self.kinds[*n as usize] == Kind::Leaf)
+                .filter(|n| self.lookup().suggests && self.kinds[*n as usize] == NodeKind::Leaf)
                 .map(|n| self.lookup().fqn(n))
                 .collect();
             self.findings.push(

@@ -3,7 +3,7 @@
 use davit::model::{Catalogue, ComponentName, ComponentSnapshot, Snapshot, Step};
 use davit::platform::conformance::{Ability, Bed, BedTrouble, RuleReport, RuleVerdict, StandIn, UnderTest, rules, run};
 use davit::platform::simulated::Simulated;
-use davit::platform::{EventSink, Execution, ObserveError, Outcome, Platform};
+use davit::platform::{EventSink, Execution, ObserveError, Outcome, Platform, StepBatch};
 use davit::time::{Clock, Time};
 use std::sync::Arc;
 use std::time::Duration;
@@ -27,6 +27,16 @@ enum Wrong {
     NothingIsSafe,
     /// Giving up waits for the end.
     WaitsToGiveUp,
+    /// Of several steps it goes on behind one that is not done.
+    GoesOn,
+    /// The last of several steps comes first.
+    Backwards,
+    /// Of several steps it does those too that were not to begin.
+    DoesNotStop,
+    /// All of several steps share the time of the first.
+    SharesTheTime,
+    /// It answers several steps when all are over.
+    AnswersAtTheEnd,
 }
 
 struct WrongBed(Wrong);
@@ -96,6 +106,43 @@ impl Platform for BrokenRule {
             _ => self.inner.execute_safe(step, deadline),
         }
     }
+    fn execute_batch(&self, batch: &StepBatch) {
+        let began = self.inner.clock().now();
+        let execute = |step: &Step, deadline| Platform::execute(&self.inner, step, deadline);
+        match self.wrong {
+            Wrong::GoesOn => {
+                for timed in batch.begin(usize::MAX) {
+                    batch.answer(execute(&timed.step, batch.deadline()));
+                }
+            }
+            Wrong::Backwards => {
+                let begun = batch.begin(usize::MAX);
+                let ended: Vec<Outcome> =
+                    begun.iter().rev().map(|timed| execute(&timed.step, batch.deadline())).collect();
+                ended.into_iter().rev().for_each(|outcome| batch.answer(outcome));
+            }
+            Wrong::DoesNotStop => {
+                batch.one_by_one(execute);
+                let behind = batch.steps().iter().skip(1).filter(|_| batch.is_stopped());
+                behind.for_each(|timed| drop(execute(&timed.step, timed.deadline(began))));
+            }
+            Wrong::SharesTheTime => {
+                let deadline = batch.steps()[0].deadline(began);
+                batch.one_by_one(|step, _| execute(step, deadline));
+            }
+            Wrong::AnswersAtTheEnd => {
+                let mut ended = Vec::new();
+                for timed in batch.begin(usize::MAX) {
+                    ended.push(execute(&timed.step, timed.deadline(self.inner.clock().now())));
+                    if !matches!(ended.last(), Some(Outcome::Done(_))) {
+                        break;
+                    }
+                }
+                ended.into_iter().for_each(|outcome| batch.answer(outcome));
+            }
+            _ => batch.one_by_one(|step, deadline| self.execute(step, deadline)),
+        }
+    }
     fn cancel(&self, step: &Step) {
         self.inner.cancel(step);
         if self.wrong == Wrong::WaitsToGiveUp {
@@ -122,6 +169,8 @@ impl Platform for BrokenRule {
     }
 }
 
+const HANGS: &str = "several_steps_end_with_one_that_hangs";
+
 fn named(report: &RuleReport) -> Vec<&'static str> {
     report.broken().map(|(rule, _)| rule.name).collect()
 }
@@ -130,7 +179,8 @@ fn named(report: &RuleReport) -> Vec<&'static str> {
 fn what_is_wrong_is_named() {
     let of = |wrong| run(&WrongBed(wrong));
     let late = [
-        "several_steps_end_with_one_that_hangs",
+        "each_of_several_steps_has_its_own_time",
+        "what_is_done_is_told_before_the_end_of_others",
         "a_hung_call_is_unknown_at_its_deadline_and_quarantined",
         "a_hung_making_or_end_is_unknown_at_its_deadline_and_quarantined",
         "a_quarantined_component_holds_up_no_other",
@@ -154,6 +204,13 @@ fn what_is_wrong_is_named() {
     let quarantine = named(&of(Wrong::KnowsNoQuarantine));
     assert!(quarantine.contains(&"a_hung_call_is_unknown_at_its_deadline_and_quarantined"), "{quarantine:?}");
     assert_eq!(named(&of(Wrong::NothingIsSafe)), ["what_is_safe_runs_beside_a_call_that_does_not_rest"]);
+    let goes_on = named(&of(Wrong::GoesOn));
+    assert_eq!(goes_on, ["several_steps_are_carried_out_as_far_as_they_are_done", HANGS]);
+    let backwards = named(&of(Wrong::Backwards));
+    assert!(backwards.contains(&"several_steps_are_carried_out_as_far_as_they_are_done"), "{backwards:?}");
+    assert_eq!(named(&of(Wrong::DoesNotStop)), ["several_steps_stop_where_they_are_told_to"]);
+    assert_eq!(named(&of(Wrong::SharesTheTime)), ["each_of_several_steps_has_its_own_time"]);
+    assert_eq!(named(&of(Wrong::AnswersAtTheEnd)), ["what_is_done_is_told_before_the_end_of_others"]);
     let waits = named(&of(Wrong::WaitsToGiveUp));
     assert!(waits.contains(&"a_call_that_is_given_up_comes_to_rest_and_counts_as_done"), "{waits:?}");
 }

@@ -5,7 +5,8 @@ use davit::platform::conformance::{self, Bed, BedTrouble, Times, UnderTest};
 use davit::platform::embedded::EmbeddedPlatform;
 use davit::record;
 use davit::runtime::{
-    Answer, Builder, Component, Context, EventOut, Failure, HookResult, In, Kind, Libraries, Library, Out, Prop, Ticket,
+    Builder, Component, ComponentFactory, Context, EventOut, Failure, HookResult, In, Libraries, Library,
+    OperationAnswer, Out, Prop, Ticket,
 };
 use davit::time::{Clock, Time};
 use std::collections::BTreeMap;
@@ -51,8 +52,8 @@ struct Plant {
 impl Component for Plant {
     fn new(b: &mut Builder<Self>) -> Self {
         b.describe("Has a member of every kind.");
-        b.no_effect().operation("nothing", |_, _, (): ()| Answer::Done(()));
-        b.no_effect().operation("scale", |_, _, (a, b): (f64, i64)| Answer::Done(a * b as f64));
+        b.no_effect().operation("nothing", |_, _, (): ()| OperationAnswer::Done(()));
+        b.no_effect().operation("scale", |_, _, (a, b): (f64, i64)| OperationAnswer::Done(a * b as f64));
         Self {
             inputs: (
                 b.unit("N").input("u"),
@@ -125,9 +126,9 @@ impl Component for Misbehaving {
         });
         b.on_cleanup(|_, cx| misbehave(cx.clock(), Transition::Cleanup.as_str()));
         b.no_effect().operation("work", Self::work);
-        b.no_effect().operation("nothing", |_, _, (): ()| Answer::Done(()));
-        b.no_effect().operation("echo", |_, _, (_,): (i64,)| Answer::Done(()));
-        b.no_effect().caller_operation("brake", |(): ()| Answer::Done(()));
+        b.no_effect().operation("nothing", |_, _, (): ()| OperationAnswer::Done(()));
+        b.no_effect().operation("echo", |_, _, (_,): (i64,)| OperationAnswer::Done(()));
+        b.no_effect().caller_operation("brake", |(): ()| OperationAnswer::Done(()));
         Self { clock: None, runs: false, task: None }
     }
 
@@ -145,25 +146,25 @@ impl Component for Misbehaving {
 
 impl Misbehaving {
     /// Takes many updates while it is updated; on a worker it takes its time there.
-    fn work(&mut self, cx: &mut Context, (): ()) -> Answer {
+    fn work(&mut self, cx: &mut Context, (): ()) -> OperationAnswer {
         let trouble = trouble_of(cx.clock(), "work");
         let end = cx.clock().now() + Times::default().work;
         match trouble {
             Some(BedTrouble::Long | BedTrouble::Deaf) => {}
-            Some(BedTrouble::Fail) => return Answer::failed("on purpose"),
-            _ => return Answer::Done(()),
+            Some(BedTrouble::Fail) => return OperationAnswer::failed("on purpose"),
+            _ => return OperationAnswer::Done(()),
         }
         if self.runs {
             self.task = Some((end, cx.ticket()));
-            return Answer::Pending;
+            return OperationAnswer::Pending;
         }
         while cx.clock().now() < end {
             if trouble == Some(BedTrouble::Long) && cx.is_cancelled() {
-                return Answer::failed("it was given up");
+                return OperationAnswer::failed("it was given up");
             }
             cx.clock().sleep(Duration::from_millis(1));
         }
-        Answer::Done(())
+        OperationAnswer::Done(())
     }
 }
 
@@ -177,7 +178,7 @@ impl Drop for Misbehaving {
 
 pub fn libraries(clock: &Clock) -> Libraries {
     let clock = clock.clone();
-    let misbehaving = Kind::made_by("Misbehaving", move |b| {
+    let misbehaving = ComponentFactory::made_by("Misbehaving", move |b| {
         let mut made = Misbehaving::new(b);
         let _ = misbehave(&clock, "create");
         made.clock = Some(clock.clone());

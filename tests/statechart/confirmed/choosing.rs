@@ -65,7 +65,7 @@ fn a_null_transition_needs_some_event_and_its_own_completion_is_one() {
 /// As above with an activity in `a` that never ends.
 fn busy_leaf() -> Run {
     let mut model = root(vec![s("a", vec![]), s("b", vec![]), t("initial", "a", ""), t("a", "b", "")]);
-    let davit::model::statechart::Node::State(a) = &mut model.root.children[0] else { panic!("a state") };
+    let davit::model::statechart::ChartNode::State(a) = &mut model.root.children[0] else { panic!("a state") };
     a.doo = function(1);
     Run::of(&model, Scripted::default().function(1, |_| IDLE))
 }
@@ -237,7 +237,7 @@ fn all_guards_run_also_where_the_events_do_not_match() {
         Part::Trans(second),
         Part::Trans(third),
     ]);
-    let yes = |_: &mut davit::statechart::View<'_>| 1;
+    let yes = |_: &mut davit::statechart::HookContext<'_>| 1;
     let mut run = Run::of(&model, Scripted::default().function(1, yes).function(2, yes).function(3, yes));
     run.run();
     run.hook.take();

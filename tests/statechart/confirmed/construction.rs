@@ -18,7 +18,7 @@ fn only_a_source_makes_the_initial_connector() {
 #[test]
 fn a_composite_with_an_activity_gets_no_initial_connector() {
     let mut model = root(vec![s("a", vec![s("x", vec![]), t("initial", "x", "")]), t("initial", "a", "")]);
-    let davit::model::statechart::Node::State(a) = &mut model.root.children[0] else { panic!("a state") };
+    let davit::model::statechart::ChartNode::State(a) = &mut model.root.children[0] else { panic!("a state") };
     a.doo = function(1);
     let (chart, found) = davit::statechart::compile(&model);
     assert!(chart.is_none());
@@ -33,7 +33,7 @@ fn a_composite_with_an_activity_gets_no_initial_connector() {
 fn an_activity_of_a_composite_is_never_run() {
     let mut model =
         root(vec![s("a", vec![c("initial"), s("x", vec![]), t("initial", "x", "")]), t("initial", "a", "")]);
-    let davit::model::statechart::Node::State(a) = &mut model.root.children[0] else { panic!("a state") };
+    let davit::model::statechart::ChartNode::State(a) = &mut model.root.children[0] else { panic!("a state") };
     a.doo = function(1);
     let mut run = Run::of(&model, Scripted::default().function(1, |_| FINISHED));
     assert!(run.run());

@@ -56,7 +56,7 @@ fn what_functions_see_while_a_transition_is_under_way() {
     go.effect.push(call(2));
     model.root.transitions.push(go);
     for (index, entry) in [(0, false), (1, true)] {
-        let davit::model::statechart::Node::State(state) = &mut model.root.children[index] else { panic!() };
+        let davit::model::statechart::ChartNode::State(state) = &mut model.root.children[index] else { panic!() };
         if entry { state.entry.push(call(3)) } else { state.exit.push(call(1)) }
     }
     let mut run = Run::of(&model, Scripted::default());
@@ -71,7 +71,7 @@ fn what_functions_see_while_a_transition_is_under_way() {
 #[test]
 fn what_entry_sends_is_queued_before_the_completion() {
     let mut model = root(vec![s("a", vec![]), t("initial", "a", ""), t("a", "a", "mine")]);
-    let davit::model::statechart::Node::State(a) = &mut model.root.children[0] else { panic!("a state") };
+    let davit::model::statechart::ChartNode::State(a) = &mut model.root.children[0] else { panic!("a state") };
     a.entry.push(call(1));
     let hook = Scripted::default().function(1, |view| {
         let mine = view.chart.event(davit::model::names::EventName::new("mine").unwrap());

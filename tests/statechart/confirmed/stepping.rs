@@ -3,7 +3,7 @@
 use super::doubted;
 use crate::scripted::*;
 use crate::support::*;
-use davit::statechart::{Machine, Nobody, RunEnd, Sim, TurnResult};
+use davit::statechart::{Machine, MicrostepResult, Nobody, RunEnd, Sim};
 use davit::time::Time;
 
 fn entered_on_event() -> davit::statechart::Chart {
@@ -100,7 +100,7 @@ fn what_waits_outside_is_merged_before_idle_is_told() {
     run.hook.outside = [vec![], vec![e]].into();
     assert!(!run.step(1), "the second look found an event: not idle, and kept for the next step");
     assert_eq!(run.leaf(), "root.a");
-    assert_eq!(run.turn(), TurnResult::Taken);
+    assert_eq!(run.microstep(), MicrostepResult::Taken);
     assert_eq!(run.leaf(), "root.b");
 }
 

@@ -17,7 +17,7 @@
 mod transitions;
 
 use crate::model::Origin;
-use crate::model::outline::{Link, Outline};
+use crate::model::outline::{Outline, OutlineTransition};
 use crate::model::statechart::{Action, FunctionId, INITIAL, Since, Statechart, Trigger};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
@@ -40,7 +40,7 @@ pub fn coordinator_scxml(chart: &Statechart) -> String {
          SCXML takes the innermost. What is sent to #_parent is a request or an event for the outside. -->\n",
     );
     let entered_from_inside = transitions::entered_from_inside(&outline);
-    let mut writer = Writer { out: &mut out, outline: &outline, entered_from_inside };
+    let mut writer = ScxmlWriter { out: &mut out, outline: &outline, entered_from_inside };
     writer.node(0, 1);
     out.push_str("</scxml>\n");
     out
@@ -68,24 +68,24 @@ pub fn plain_event(name: &str) -> String {
     text.split('.').filter(|piece| !piece.is_empty()).collect::<Vec<_>>().join(".")
 }
 
-struct Writer<'a> {
+struct ScxmlWriter<'a> {
     out: &'a mut String,
     outline: &'a Outline<'a>,
     /// Composite states that a transition from inside goes to.
     entered_from_inside: BTreeSet<usize>,
 }
 
-impl Writer<'_> {
+impl ScxmlWriter<'_> {
     fn line(&mut self, depth: usize, text: &str) {
         let _ = writeln!(self.out, "{}{text}", "  ".repeat(depth));
     }
 
-    fn links(&self, of: usize) -> Vec<Link<'_>> {
+    fn links(&self, of: usize) -> Vec<OutlineTransition<'_>> {
         self.outline.links.iter().filter(|link| link.src == of).cloned().collect()
     }
 
     /// The one transition of an initial connector that needs no event: then `<initial>` says it.
-    fn simple_initial(&self, at: usize) -> Option<Link<'_>> {
+    fn simple_initial(&self, at: usize) -> Option<OutlineTransition<'_>> {
         let initial = self.outline.child(at, INITIAL).filter(|i| self.outline.items[*i].state.is_none())?;
         if self.entered_from_inside.contains(&at) {
             return None;

@@ -1,9 +1,9 @@
 //! Transitions: where they go, on what, and in which order.
 
-use super::{Writer, plain_event, quoted};
+use super::{ScxmlWriter, plain_event, quoted};
 use crate::model::Origin;
-use crate::model::outline::{Link, Outline};
-use crate::model::statechart::{Action, FunctionId, INITIAL, Transition, Trigger};
+use crate::model::outline::{Outline, OutlineTransition};
+use crate::model::statechart::{Action, ChartTransition, FunctionId, INITIAL, Trigger};
 use crate::statechart::sort_by_priority;
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -28,7 +28,8 @@ fn is_inside(outline: &Outline<'_>, node: usize, state: usize) -> bool {
 /// Composite states that a transition from inside goes to. In rFSM such a state is not left, in SCXML it is; going to a state
 /// in it is the same in both. So its initial connector is written as a state.
 pub fn entered_from_inside(outline: &Outline<'_>) -> BTreeSet<usize> {
-    let within = |link: &Link<'_>| entered(outline, link.tgt).filter(|state| is_inside(outline, link.src, *state));
+    let within =
+        |link: &OutlineTransition<'_>| entered(outline, link.tgt).filter(|state| is_inside(outline, link.src, *state));
     outline.links.iter().filter_map(within).collect()
 }
 
@@ -40,7 +41,7 @@ struct Start {
     calls: Vec<(String, String)>,
 }
 
-impl Writer<'_> {
+impl ScxmlWriter<'_> {
     /// The id to go to for going from `src` to `tgt`.
     pub(super) fn target(&self, src: usize, tgt: usize) -> String {
         let outline = self.outline;
@@ -57,7 +58,7 @@ impl Writer<'_> {
 
     pub(super) fn transitions(&mut self, at: usize, depth: usize) {
         let outline = self.outline;
-        let mut tried: Vec<(usize, &Link<'_>)> =
+        let mut tried: Vec<(usize, &OutlineTransition<'_>)> =
             outline.links.iter().filter(|link| link.src == at).enumerate().collect();
         sort_by_priority(&mut tried, |(_, link)| link.transition.pn);
         let moved = tried.iter().enumerate().any(|(now, (written, _))| now != *written);
@@ -77,7 +78,7 @@ impl Writer<'_> {
     }
 
     /// A transition's ways to start. One on events and on predicates is written as two.
-    fn starts(&self, at: usize, transition: &Transition) -> Vec<Start> {
+    fn starts(&self, at: usize, transition: &ChartTransition) -> Vec<Start> {
         let fqn = &self.outline.items[at].fqn;
         let guard = transition.guard.map(|(id, _)| (format!("guard_{}", id.0), format!("guard_{}()", id.0)));
         let start = || Start { plain: Vec::new(), written: Vec::new(), calls: guard.iter().cloned().collect() };

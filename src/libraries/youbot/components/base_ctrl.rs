@@ -4,7 +4,7 @@ use super::aged;
 use super::samples::{Odometry, Twist};
 use crate::libraries::youbot::base::Twist2;
 use crate::libraries::youbot::dynamics::BaseLimits;
-use crate::runtime::{Answer, Builder, Component, Context, In, Out, Prop};
+use crate::runtime::{Builder, Component, Context, In, OperationAnswer, Out, Prop};
 
 /// A wanted twist older than this is none, in s.
 const STALE: f64 = 0.1;
@@ -36,7 +36,7 @@ impl Component for BaseCtrl {
             |c, _, (): ()| {
                 c.last = Twist2::default();
                 c.cmd_twist.write(Twist::default());
-                Answer::Done(())
+                OperationAnswer::Done(())
             },
         );
         Self {

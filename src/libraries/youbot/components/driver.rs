@@ -7,7 +7,7 @@ use crate::libraries::youbot::parameters::{GEAR, GRIPPER, JOINTS, PARK_POSE_DEG,
 use crate::libraries::youbot::plant::ArmPlant;
 use crate::libraries::youbot::rigid_body::{ArmModel, J5, radians};
 use crate::model::{EventName, Tunable};
-use crate::runtime::{Answer, Builder, Component, Context, EventOut, In, Out, Prop, Ticket};
+use crate::runtime::{Builder, Component, Context, EventOut, In, OperationAnswer, Out, Prop, Ticket};
 use nalgebra::Vector3;
 
 /// Falling by more than this when the drives go off is dropping the arm, in m.
@@ -112,8 +112,8 @@ impl Component for Driver {
         b.doc("Changes what the drives do: 0 off, 1 hold a position, 6 take torques.").operation(
             "setControlMode",
             |c, _, (mode,): (u8,)| match DriveMode::from_number(mode) {
-                Some(mode) => c.drives.set_mode(mode).map_or_else(Answer::failed, Answer::Done),
-                None => Answer::failed(format!("no control mode {mode}: 0, 1 or 6")),
+                Some(mode) => c.drives.set_mode(mode).map_or_else(OperationAnswer::failed, OperationAnswer::Done),
+                None => OperationAnswer::failed(format!("no control mode {mode}: 0, 1 or 6")),
             },
         );
         b.doc("Finds the stops of joints 2 to 4; ends resting on them, drives off. Takes seconds.")
@@ -133,12 +133,12 @@ impl Component for Driver {
         )
         .no_effect()
         .operation("inject_fault", |c, _, (fault,): (String,)| match c.fail(&fault) {
-            true => Answer::Done(()),
-            false => Answer::failed(format!("no fault `{fault}`")),
+            true => OperationAnswer::Done(()),
+            false => OperationAnswer::failed(format!("no fault `{fault}`")),
         });
         b.doc("Forgets the drives' error flags.").no_effect().operation("clear_faults", |c, _, (): ()| {
             c.motors.error_flags = 0;
-            Answer::Done(())
+            OperationAnswer::Done(())
         });
         b.doc("The drives hold where they are, whatever is commanded; raises e_EMERGENCY_STOP.").no_effect().operation(
             "emergency_stop",
@@ -146,7 +146,7 @@ impl Component for Driver {
                 c.task = None;
                 c.drives.hold();
                 c.events.raise(c.names.emergency);
-                Answer::Done(())
+                OperationAnswer::Done(())
             },
         );
         b.doc("Whatever moves comes to rest along a ramp and is held there; the base stands.")
@@ -154,32 +154,32 @@ impl Component for Driver {
             .operation("brake", |c, _, (): ()| {
                 c.task = None;
                 c.drives.brake();
-                Answer::Done(())
+                OperationAnswer::Done(())
             });
         b.doc("The same, and nothing takes it back: for what moves although they were braked before.")
             .no_effect()
             .operation("stop", |c, _, (): ()| {
                 c.task = None;
                 c.drives.stop();
-                Answer::Done(())
+                OperationAnswer::Done(())
             });
         b.doc(
             "The drives take torques, as mode 6 which was set before says: for after they held by themselves. Fails while they \
              brake and were not released.",
         )
         .no_effect()
-        .operation("resume", |c, _, (): ()| c.drives.resume().map_or_else(Answer::failed, Answer::Done));
+        .operation("resume", |c, _, (): ()| c.drives.resume().map_or_else(OperationAnswer::failed, OperationAnswer::Done));
         b.doc("The drives take torques again if they did before they braked, for whatever reason; else they hold on.")
             .undone_by("brake")
             .operation("release", |c, _, (): ()| {
                 c.drives.release();
-                Answer::Done(())
+                OperationAnswer::Done(())
             });
         b.doc("Whether torques are passed on also near the joints' limits.").operation(
             "disable_jntlim_safety",
             |c, _, (off,): (bool,)| {
                 c.drives.limit_safety = !off;
-                Answer::Done(())
+                OperationAnswer::Done(())
             },
         );
         let p = DriveParameters::default();
@@ -328,16 +328,16 @@ impl Component for Driver {
 
 impl Driver {
     /// Begins something that takes many updates; its ticket answers when it has ended.
-    fn begin(&mut self, cx: &mut Context, f: fn(&mut Drives) -> Result<(), &'static str>) -> Answer {
+    fn begin(&mut self, cx: &mut Context, f: fn(&mut Drives) -> Result<(), &'static str>) -> OperationAnswer {
         if !self.running {
-            return Answer::failed("the driver is not running");
+            return OperationAnswer::failed("the driver is not running");
         }
         match f(&mut self.drives) {
             Ok(()) => {
                 self.task = Some(cx.ticket());
-                Answer::Pending
+                OperationAnswer::Pending
             }
-            Err(why) => Answer::failed(why),
+            Err(why) => OperationAnswer::failed(why),
         }
     }
 

@@ -6,7 +6,7 @@ use crate::libraries::youbot::dynamics::{Coupled, Dynamics, DynamicsParameters, 
 use crate::libraries::youbot::parameters::GRIPPER;
 use crate::libraries::youbot::rigid_body::{ArmModel, J5};
 use crate::model::Tunable;
-use crate::runtime::{Answer, Builder, Component, Context, In, Out, Prop};
+use crate::runtime::{Builder, Component, Context, In, OperationAnswer, Out, Prop};
 use nalgebra::Vector3;
 
 /// A wanted force older than this is none, in s: the controller that sent it has stopped.
@@ -54,7 +54,7 @@ impl Component for DynamicsComponent {
         b.doc("Torques that hold the arm at these angles.")
             .no_effect()
             .operation("compute_gravity", |c, _, (q,): (J5,)| {
-                Answer::Done(c.law.model.gravity(&c.law.model.posture(&q)))
+                OperationAnswer::Done(c.law.model.gravity(&c.law.model.posture(&q)))
             });
         Self {
             f_des: b.doc("Force wanted on the tool, in the world.").unit("N").input("f_des"),

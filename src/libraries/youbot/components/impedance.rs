@@ -2,7 +2,7 @@
 
 use super::samples::{ExtRef, ToolPose, ToolTwist, stamp};
 use crate::libraries::youbot::impedance::{Impedance, ImpedanceParameters, Reference};
-use crate::runtime::{Answer, Builder, Component, Context, In, Out, Prop};
+use crate::runtime::{Builder, Component, Context, In, OperationAnswer, Out, Prop};
 use nalgebra::Vector3;
 
 /// The component.
@@ -65,7 +65,7 @@ impl Component for CartImpedance {
         });
         b.doc("The force begins from zero again.").no_effect().operation("reset", |c, _, (): ()| {
             c.law.reset();
-            Answer::Done(())
+            OperationAnswer::Done(())
         });
         Self {
             tool_pose: b.doc("Where this tool is.").required().input("tool_pose"),

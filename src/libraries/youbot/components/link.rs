@@ -2,7 +2,7 @@
 
 use super::samples::{ExtRef, ToolPose, ToolTwist, stamp};
 use crate::libraries::youbot::link::{LinkReceiver, LinkStats, Packet, PeerState, RESTART_SHOWN};
-use crate::runtime::{Answer, Builder, Component, Context, In, Out, Prop};
+use crate::runtime::{Builder, Component, Context, In, OperationAnswer, Out, Prop};
 
 /// Sends where the tool is.
 pub struct LinkTx {
@@ -89,7 +89,7 @@ impl Component for LinkRx {
             });
         b.doc("Forgets packets and measurements.").no_effect().operation("reset_stats", |c, _, (): ()| {
             c.receiver.reset();
-            Answer::Done(())
+            OperationAnswer::Done(())
         });
         Self {
             rx: b.doc("Packets.").buffered().required().input("rx"),

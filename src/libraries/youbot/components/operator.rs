@@ -3,7 +3,7 @@
 use super::samples::{ExtRef, ToolPose, ToolTwist};
 use crate::libraries::youbot::hand::{Hand, HandScript};
 use crate::model::EventName;
-use crate::runtime::{Answer, Builder, Component, Context, EventOut, Failure, In, Out, Prop};
+use crate::runtime::{Builder, Component, Context, EventOut, Failure, In, OperationAnswer, Out, Prop};
 use nalgebra::Vector3;
 
 /// The hand on this robot's tool.
@@ -32,9 +32,9 @@ impl Component for Operator {
             match text.parse::<HandScript>() {
                 Ok(script) => {
                     c.hand.follow(script);
-                    Answer::Done(())
+                    OperationAnswer::Done(())
                 }
-                Err(e) => Answer::failed(e.to_string()),
+                Err(e) => OperationAnswer::failed(e.to_string()),
             }
         });
         Self {

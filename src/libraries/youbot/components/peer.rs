@@ -8,7 +8,7 @@ use crate::libraries::youbot::network::{Network, Quality};
 use crate::libraries::youbot::rigid_body::{J5, radians};
 use crate::libraries::youbot::robot::{CONTROL_PERIOD, Robot};
 use crate::model::Tunable;
-use crate::runtime::{Answer, Builder, Component, Context, Failure, In, Out, Prop};
+use crate::runtime::{Builder, Component, Context, Failure, In, OperationAnswer, Out, Prop};
 use nalgebra::Vector3;
 
 /// Between two packets of the other robot, in s.
@@ -117,7 +117,7 @@ impl Component for Peer {
             c.epoch += 1;
             c.world.seq = 0;
             c.world.from_peer.clear();
-            Answer::Done(())
+            OperationAnswer::Done(())
         });
         let law = crate::libraries::youbot::impedance::ImpedanceParameters::default();
         Self {

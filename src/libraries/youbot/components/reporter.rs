@@ -2,7 +2,7 @@
 
 use super::samples::{ExtRef, JointState, Odometry, ToolPose};
 use crate::model::Tunable;
-use crate::runtime::{Answer, Builder, Component, Context, Failure, In, Prop};
+use crate::runtime::{Builder, Component, Context, Failure, In, OperationAnswer, Prop};
 use nalgebra::Vector3;
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -46,7 +46,7 @@ impl Component for Reporter {
         });
         b.doc("Brings what was recorded onto the disk.")
             .no_effect()
-            .operation("snapshot", |c, _, (): ()| Answer::from(c.flush()));
+            .operation("snapshot", |c, _, (): ()| OperationAnswer::from(c.flush()));
         Self {
             tool_pose: b.doc("Where the tool is.").input("tool_pose"),
             ext_ref: b.doc("Where the other tool is.").input("ext_ref"),

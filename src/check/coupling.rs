@@ -55,8 +55,8 @@ pub fn shared(deployment: &Deployment, charts: &[&Chart], numbers: &[usize], ver
         return Vec::new();
     }
     let names: Vec<Ident> = numbers.iter().map(|number| deployment.coordinators[*number].name).collect();
-    let of = |ids: BTreeSet<ConfigId>| -> Vec<Touched<'_>> {
-        deployment.configurations.iter().filter(|c| ids.contains(&c.id)).map(Touched::by).collect()
+    let of = |ids: BTreeSet<ConfigId>| -> Vec<ConfigurationExtent<'_>> {
+        deployment.configurations.iter().filter(|c| ids.contains(&c.id)).map(ConfigurationExtent::by).collect()
     };
     let all: Vec<_> = numbers.iter().map(|number| of(asked(deployment, charts[*number]))).collect();
     let operated = of(by_operator(deployment));
@@ -69,7 +69,9 @@ pub fn shared(deployment: &Deployment, charts: &[&Chart], numbers: &[usize], ver
         for (b, theirs) in all.iter().enumerate().skip(a + 1) {
             let both = mine.iter().find_map(|one| theirs.iter().find_map(|other| Some((one, other, one.with(other)?))));
             let between = || {
-                let met = |of: &Touched<'_>, all: &[Touched<'_>]| all.iter().find_map(|own| of.with(own));
+                let met = |of: &ConfigurationExtent<'_>, all: &[ConfigurationExtent<'_>]| {
+                    all.iter().find_map(|own| of.with(own))
+                };
                 operated.iter().find_map(|of| Some((of, met(of, mine)?, met(of, theirs)?)))
             };
             if let Some((one, other, what)) = both {
@@ -102,14 +104,14 @@ pub fn shared(deployment: &Deployment, charts: &[&Chart], numbers: &[usize], ver
 }
 
 /// What a configuration may touch, for words.
-struct Touched<'d> {
+struct ConfigurationExtent<'d> {
     of: &'d Configuration,
     components: BTreeSet<ComponentName>,
     /// All there is, by `_default`.
     all: bool,
 }
 
-impl<'d> Touched<'d> {
+impl<'d> ConfigurationExtent<'d> {
     fn by(of: &'d Configuration) -> Self {
         let mut entries = of.pre.iter().chain(of.post.iter());
         let all = entries.any(|entry| entry.target == Target::Default);

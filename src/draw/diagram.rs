@@ -1,16 +1,16 @@
-//! A picture before it is drawn: nodes inside nodes, edges between them, what each looks like. SVG, DOT and Mermaid are
-//! three ways to write the same picture.
+//! A diagram before it is drawn: nodes inside nodes, edges between them, what each looks like. SVG, DOT and Mermaid are
+//! three ways to write the same diagram.
 
-/// Which way the ranks of a picture run.
+/// Which way the ranks of a diagram run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Direction {
+pub enum RankDirection {
     /// Left to right: data flow, plans.
     Right,
     /// Top to bottom: statecharts.
     Down,
 }
 
-/// What a picture is of; Mermaid has a language of its own for statecharts.
+/// What a diagram is of; Mermaid has a language of its own for statecharts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Subject {
     /// Components and their connections.
@@ -54,10 +54,10 @@ pub enum Tone {
 
 /// A node.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Node {
-    /// Its name among all nodes of the picture.
+pub struct DiagramNode {
+    /// Its name among all nodes of the diagram.
     pub id: String,
-    /// The group it stands in: an index into [`Picture::nodes`], smaller than its own.
+    /// The group it stands in: an index into [`Diagram::nodes`], smaller than its own.
     pub parent: Option<usize>,
     /// Its outline.
     pub shape: Shape,
@@ -73,7 +73,7 @@ pub struct Node {
     pub outs: Vec<String>,
 }
 
-impl Node {
+impl DiagramNode {
     /// A plain box at the top level.
     pub fn new(id: impl Into<String>, title: impl Into<String>) -> Self {
         Self {
@@ -91,14 +91,14 @@ impl Node {
 
 /// An edge.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Edge {
-    /// Where it begins: an index into [`Picture::nodes`].
+pub struct DiagramEdge {
+    /// Where it begins: an index into [`Diagram::nodes`].
     pub from: usize,
-    /// The out-port it leaves from, an index into the node's [`Node::outs`].
+    /// The out-port it leaves from, an index into the node's [`DiagramNode::outs`].
     pub from_port: Option<usize>,
     /// Where it ends.
     pub to: usize,
-    /// The in-port it ends at, an index into the node's [`Node::ins`].
+    /// The in-port it ends at, an index into the node's [`DiagramNode::ins`].
     pub to_port: Option<usize>,
     /// Lines of text on it.
     pub label: Vec<String>,
@@ -106,7 +106,7 @@ pub struct Edge {
     pub dashed: bool,
 }
 
-impl Edge {
+impl DiagramEdge {
     /// A plain edge between two nodes.
     pub fn new(from: usize, to: usize) -> Self {
         Self { from, from_port: None, to, to_port: None, label: Vec::new(), dashed: false }
@@ -115,29 +115,29 @@ impl Edge {
 
 /// Nodes and edges with all they look like, but no coordinates.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Picture {
+pub struct Diagram {
     /// What it is of.
     pub subject: Subject,
     /// Which way it runs.
-    pub direction: Direction,
+    pub direction: RankDirection,
     /// Its name.
     pub title: String,
     /// The nodes; groups stand before what is in them.
-    pub nodes: Vec<Node>,
+    pub nodes: Vec<DiagramNode>,
     /// The edges.
-    pub edges: Vec<Edge>,
+    pub edges: Vec<DiagramEdge>,
     /// What the colours mean, in the order to be shown; empty: nothing to explain.
     pub legend: Vec<(Tone, String)>,
 }
 
-impl Picture {
-    /// An empty picture.
-    pub fn new(subject: Subject, direction: Direction, title: impl Into<String>) -> Self {
+impl Diagram {
+    /// An empty diagram.
+    pub fn new(subject: Subject, direction: RankDirection, title: impl Into<String>) -> Self {
         Self { subject, direction, title: title.into(), nodes: Vec::new(), edges: Vec::new(), legend: Vec::new() }
     }
 
     /// Adds a node; answers its index.
-    pub fn add(&mut self, node: Node) -> usize {
+    pub fn add(&mut self, node: DiagramNode) -> usize {
         debug_assert!(node.parent.is_none_or(|p| p < self.nodes.len()), "groups stand before what is in them");
         self.nodes.push(node);
         self.nodes.len() - 1

@@ -2,12 +2,12 @@
 //!
 //! A transition hears an answer when that event alone can take it all the way: from a state, through connectors, to a leaf.
 //! So what stands behind a connector counts with what leads to it, and the way into a composite state, which wants no
-//! event, is no ear.
+//! event, does not hear.
 
 use super::coordinator::{ask_of, bad_answers, edges, place};
 use crate::model::codes::COORD_FAILURE_UNHANDLED;
 use crate::model::{Ask, Deployment, EventName, Finding, Findings, Verdict};
-use crate::statechart::{Chart, EdgeId, EventId, Kind, NodeId, RaiseSite, When};
+use crate::statechart::{Chart, EdgeId, EventId, NodeId, NodeKind, RaiseMoment, RaiseSite};
 use rustc_hash::{FxHashMap, FxHashSet};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -15,11 +15,11 @@ use std::collections::{BTreeMap, BTreeSet};
 pub fn check(deployment: &Deployment, chart: &Chart) -> Findings {
     let mut findings = Vec::new();
     let mut missing: BTreeMap<EventName, (&RaiseSite, Ask, BTreeSet<EventName>)> = BTreeMap::new();
-    let mut ears: FxHashMap<EventId, Vec<NodeId>> = FxHashMap::default();
+    let mut hearers: FxHashMap<EventId, Vec<NodeId>> = FxHashMap::default();
     for site in chart.raises() {
         let Some(ask) = ask_of(deployment, site.name) else { continue };
         // Undoing what a state brought with it: nobody waits for that, and the stack keeps the frame.
-        if site.scoped && matches!(site.when, When::Exit(_)) {
+        if site.scoped && matches!(site.when, RaiseMoment::Exit(_)) {
             continue;
         }
         // A configuration that must be confirmed is undone behind the coordinator's back if it is not. `cancelled` needs
@@ -36,8 +36,8 @@ pub fn check(deployment: &Deployment, chart: &Chart) -> Findings {
         }
         for answer in bad_answers(ask) {
             let event = chart.event(answer);
-            let ears = ears.entry(event).or_insert_with(|| hearing(chart, event));
-            if !ears.iter().any(|state| chart.is_inside(*state, owner) || chart.is_inside(owner, *state)) {
+            let hearers = hearers.entry(event).or_insert_with(|| hearing(chart, event));
+            if !hearers.iter().any(|state| chart.is_inside(*state, owner) || chart.is_inside(owner, *state)) {
                 missing.entry(site.name).or_insert_with(|| (site, ask, BTreeSet::new())).2.insert(answer);
             }
         }
@@ -63,11 +63,11 @@ pub fn check(deployment: &Deployment, chart: &Chart) -> Findings {
 
 /// The state that is active until an answer comes, or nobody is told: who enters asks for himself; what an exit or an
 /// effect asks for is heard in the outermost state that stays active on the way, here on any way there is.
-fn owner(chart: &Chart, when: When) -> NodeId {
+fn owner(chart: &Chart, when: RaiseMoment) -> NodeId {
     let edge = match when {
-        When::Entry(state) => return state,
-        When::Exit(_) => return NodeId::ROOT,
-        When::Effect(edge) => edge,
+        RaiseMoment::Entry(state) => return state,
+        RaiseMoment::Exit(_) => return NodeId::ROOT,
+        RaiseMoment::Effect(edge) => edge,
     };
     let mut seen: FxHashSet<EdgeId> = FxHashSet::default();
     let mut open = vec![edge];
@@ -99,7 +99,7 @@ fn hearing(chart: &Chart, event: EventId) -> Vec<NodeId> {
     for edge in edges(chart).filter(|edge| chart.may_trigger(*edge, event)) {
         let (from, to) = chart.ends(edge);
         into.entry(to).or_default().push(from);
-        if chart.kind(to) == Kind::Leaf {
+        if chart.kind(to) == NodeKind::Leaf {
             open.push(from);
         }
     }

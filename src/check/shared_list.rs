@@ -9,9 +9,9 @@ use std::rc::Rc;
 
 /// A list that costs nothing where it is empty, and nothing to copy.
 #[derive(Debug, PartialEq, Eq, Hash)]
-pub struct Few<T>(Option<Rc<Vec<T>>>);
+pub struct SharedList<T>(Option<Rc<Vec<T>>>);
 
-impl<T> Few<T> {
+impl<T> SharedList<T> {
     /// None.
     pub const fn new() -> Self {
         Self(None)
@@ -28,7 +28,7 @@ impl<T> Few<T> {
     }
 }
 
-impl<T: Clone> Few<T> {
+impl<T: Clone> SharedList<T> {
     /// Lets something change them. An empty list stands as none, so that equal ones are equal.
     fn change<R>(&mut self, with: impl FnOnce(&mut Vec<T>) -> R) -> R {
         let list = Rc::make_mut(self.0.get_or_insert_default());
@@ -70,19 +70,19 @@ impl<T: Clone> Few<T> {
     }
 }
 
-impl<T> Clone for Few<T> {
+impl<T> Clone for SharedList<T> {
     fn clone(&self) -> Self {
         Self(self.0.clone())
     }
 }
 
-impl<T> Default for Few<T> {
+impl<T> Default for SharedList<T> {
     fn default() -> Self {
         Self::new()
     }
 }
 
-impl<T> Deref for Few<T> {
+impl<T> Deref for SharedList<T> {
     type Target = [T];
 
     fn deref(&self) -> &[T] {
@@ -90,7 +90,7 @@ impl<T> Deref for Few<T> {
     }
 }
 
-impl<T: Clone> DerefMut for Few<T> {
+impl<T: Clone> DerefMut for SharedList<T> {
     fn deref_mut(&mut self) -> &mut [T] {
         match &mut self.0 {
             Some(list) => Rc::make_mut(list).as_mut_slice(),
@@ -99,7 +99,7 @@ impl<T: Clone> DerefMut for Few<T> {
     }
 }
 
-impl<T: Clone> Extend<T> for Few<T> {
+impl<T: Clone> Extend<T> for SharedList<T> {
     fn extend<I: IntoIterator<Item = T>>(&mut self, more: I) {
         let mut more = more.into_iter().peekable();
         if more.peek().is_some() {
@@ -108,15 +108,15 @@ impl<T: Clone> Extend<T> for Few<T> {
     }
 }
 
-impl<T: Clone> FromIterator<T> for Few<T> {
+impl<T: Clone> FromIterator<T> for SharedList<T> {
     fn from_iter<I: IntoIterator<Item = T>>(all: I) -> Self {
-        let mut few = Self::new();
-        few.extend(all);
-        few
+        let mut list = Self::new();
+        list.extend(all);
+        list
     }
 }
 
-impl<'a, T> IntoIterator for &'a Few<T> {
+impl<'a, T> IntoIterator for &'a SharedList<T> {
     type Item = &'a T;
     type IntoIter = std::slice::Iter<'a, T>;
 
@@ -125,7 +125,7 @@ impl<'a, T> IntoIterator for &'a Few<T> {
     }
 }
 
-impl<T: Clone> IntoIterator for Few<T> {
+impl<T: Clone> IntoIterator for SharedList<T> {
     type Item = T;
     type IntoIter = std::vec::IntoIter<T>;
 
