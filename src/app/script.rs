@@ -24,7 +24,7 @@ use crate::time::{Clock, Time};
 use failure::IsRefused;
 pub use failure::ScriptFailure;
 pub use interrupt::Interrupt;
-use mlua::{Lua, Table, Value as LuaValue};
+use mlua::{FromLua, Lua, Table, Value as LuaValue};
 use std::any::Any;
 use std::cell::RefCell;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -216,8 +216,9 @@ fn install(lua: &Lua, host: &SharedHost) -> mlua::Result<()> {
         values::to_lua(lua, &serde_json::to_value(drift).expect("plain data"))
     });
     function!("recover", String, |h, _lua, how| recover(h, &how));
-    function!("wait", LuaValue, |h, _lua, seconds| {
-        let seconds = seconds.as_f64().ok_or_else(|| {
+    function!("wait", LuaValue, |h, lua, seconds| {
+        // Numbers of either kind, and texts that are numbers, as everywhere in Lua.
+        let seconds = f64::from_lua(seconds, lua).map_err(|_| {
             error("`wait` takes seconds: `wait(0.5)`; what waits for an answer is `wait_answer(\"ID.ok\", 5)`, for a state `wait_state(\"NAME\", 5)`")
         })?;
         let (clock, until, interrupt) = (clock(h), deadline(h, seconds)?, interrupt(h));

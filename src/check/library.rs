@@ -16,7 +16,7 @@ pub fn check(deployment: &Deployment, catalogue: &Catalogue) -> Findings {
     for declared in &deployment.types {
         // One that no library has is in the catalogue as it is declared.
         let Some(library) = catalogue.get(declared.name).filter(|ty| !ty.origin.is_some()) else { continue };
-        Compared { ty: declared.name, origin: declared.origin, by: By::Library, findings: &mut findings }
+        Compared { ty: declared.name, origin: declared.origin, by: TypeOwner::Library, findings: &mut findings }
             .types(declared, library);
     }
     findings
@@ -36,7 +36,8 @@ pub fn platform(deployment: &Deployment, catalogue: &Catalogue, platform: &Catal
             findings.push(Finding::error(TYPE_DIFFERS, message).at(change.origin));
             continue;
         };
-        Compared { ty: *ty, origin: checked.origin, by: By::Platform, findings: &mut findings }.types(checked, own);
+        Compared { ty: *ty, origin: checked.origin, by: TypeOwner::Platform, findings: &mut findings }
+            .types(checked, own);
     }
     findings.retain(Finding::is_error);
     findings
@@ -44,12 +45,12 @@ pub fn platform(deployment: &Deployment, catalogue: &Catalogue, platform: &Catal
 
 /// Who has a type otherwise than it was declared.
 #[derive(Clone, Copy)]
-enum By {
+enum TypeOwner {
     Library,
     Platform,
 }
 
-impl By {
+impl TypeOwner {
     fn word(self) -> &'static str {
         match self {
             Self::Library => "library",
@@ -81,7 +82,7 @@ impl Departures {
 struct Compared<'f> {
     ty: TypeName,
     origin: Origin,
-    by: By,
+    by: TypeOwner,
     findings: &'f mut Findings,
 }
 
@@ -162,12 +163,12 @@ impl Compared<'_> {
     fn tell(&mut self, fails: bool, message: String, at: Origin, path: String) {
         let make = if fails { Finding::error } else { Finding::warning };
         let help = match self.by {
-            By::Library => format!(
+            TypeOwner::Library => format!(
                 "the library's counts, as it is what runs: write what it has (`davit types {}` shows it), or leave the declaration \
                  out",
                 self.ty
             ),
-            By::Platform => "the platform's counts, as it is what runs: declare what it has".to_owned(),
+            TypeOwner::Platform => "the platform's counts, as it is what runs: declare what it has".to_owned(),
         };
         self.findings.push(make(TYPE_DIFFERS, message).at(at).path(path).help(help));
     }

@@ -1,7 +1,7 @@
 //! What is said of worlds: where something leads to, and what a batch or a safe configuration comes to in one.
 
 use crate::model::{ConfigId, Findings, Verdict};
-use crate::stack::{Ending, Endings, FrameId, Group, Request};
+use crate::stack::{Ending, Endings, FrameId, Group, Request, Requester};
 use crate::transaction::{Stopping, endings};
 use smallvec::SmallVec;
 use std::rc::Rc;
@@ -26,6 +26,9 @@ pub struct Went {
     /// The same with [`limits::CHECK_LEFT`].
     pub left: Option<ConfigId>,
 }
+
+/// A configuration, and who asked for it.
+pub type Whose = (ConfigId, Requester);
 
 /// Frames that must stay as they are.
 pub type Held = SmallVec<[FrameId; 2]>;

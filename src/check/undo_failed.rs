@@ -14,7 +14,7 @@
 //! ([`Bound::Aside`](super::bound::Bound::Aside)).
 
 use super::aside::Aside;
-use super::outcome::{Went, WorldId};
+use super::outcome::{Went, Whose, WorldId};
 use super::product::Product;
 use super::state::ProductState;
 use super::world::Worlds;
@@ -23,9 +23,6 @@ use crate::stack::claims::Claims;
 use crate::stack::{Frame, Request, Requester};
 use smallvec::SmallVec;
 use std::sync::Arc;
-
-/// A configuration, and who asked for it.
-pub(super) type Whose = (ConfigId, Requester);
 
 impl Product<'_> {
     /// These undos have failed: the states in which that may be followed on.

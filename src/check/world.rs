@@ -8,9 +8,8 @@
 //! After *broken* nothing is known any more: that is a world of its own ([`Top`]).
 
 use super::equivalence::{hash_system, same_system};
-use super::outcome::{Comes, ConcurrentWork, Held, SafeComes, Went, WorldId};
+use super::outcome::{Comes, ConcurrentWork, Held, SafeComes, Went, Whose, WorldId};
 use super::shape::{Counted, Shapes, Undone};
-use super::undo_failed::Whose;
 use crate::limits;
 use crate::model::{Ask, Catalogue, ConfigId, Configuration, Deployment, RequestId};
 use crate::plan::{PlanContext, Refusal, plan};

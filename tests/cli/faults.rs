@@ -115,6 +115,12 @@ fn refused(script: &str) -> String {
 }
 
 #[test]
+fn wait_takes_seconds_and_says_what_waits_for_an_answer() {
+    let said = refused("deploy('deployment.yaml') wait('fast.ok')");
+    assert!(said.contains("what waits for an answer is `wait_answer("), "{said}");
+}
+
+#[test]
 fn what_cannot_go_wrong_is_refused_before_or_after_the_deployment() {
     for (fault, says) in [
         ("fault('property_set source.k', 'fial')", "`fial` is no kind of fault: did you mean `fail`?"),
@@ -122,7 +128,6 @@ fn what_cannot_go_wrong_is_refused_before_or_after_the_deployment() {
         ("fault('property_set source.k', 'fail', 1.5)", "1.5 is not a number of times"),
         ("fault('property_set source.k', 'fail', 1e9)", "1000000000 is not a number of times"),
         ("fault('property_set source.k', 'fail', 0/0)", "is not a number of times"),
-        ("deploy('deployment.yaml') wait('fast.ok')", "what waits for an answer is `wait_answer("),
         ("fault('proprety_set source.k', 'fail')", "did you mean `property_set`?"),
         ("fault('', 'fail')", "`` is no step"),
         ("fault('property_set source.kk', 'fail')", "did you mean `k`?"),

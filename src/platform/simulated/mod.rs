@@ -340,7 +340,7 @@ impl Platform for Simulated {
 
     /// Its components have no code that writes anything: run states can be seen, values cannot.
     fn watch(&self, inputs: &[MonitorInput], _: &Signal) -> Option<Box<dyn Watch>> {
-        Some(Box::new(States { shared: Arc::downgrade(&self.shared), inputs: inputs.to_vec() }))
+        Some(Box::new(StatesWatch { shared: Arc::downgrade(&self.shared), inputs: inputs.to_vec() }))
     }
 
     fn subscribe(&self, sink: EventSink) {
@@ -380,12 +380,12 @@ impl Prepared for SimulatedPrepared {
 }
 
 /// A look at run states.
-struct States {
+struct StatesWatch {
     shared: Weak<SimulatedInner>,
     inputs: Vec<MonitorInput>,
 }
 
-impl Watch for States {
+impl Watch for StatesWatch {
     fn shows(&self, input: usize) -> bool {
         matches!(self.inputs[input], MonitorInput::State(_) | MonitorInput::Faulted(_))
     }
