@@ -52,7 +52,7 @@ impl Graph<'_, '_> {
     pub(super) fn stands_still(&self) -> Vec<bool> {
         let safe = |at: u32| {
             let state = &self.states[at as usize];
-            state.stopping && self.product.worlds.is_safe(state.world)
+            state.stopping && (state.elsewhere || self.product.worlds.is_safe(state.world))
         };
         // What was in force before counts for nothing. Each state is judged by its best way.
         let begins = |edge: &&Edge| !self.states[edge.from as usize].stopping && safe(edge.to);

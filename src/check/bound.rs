@@ -54,6 +54,9 @@ pub enum Bound {
     Stopping,
     /// A coordinator that is down goes on while others, followed apart, are not.
     Apart,
+    /// What a safe configuration of coordinators that are followed apart interrupts behind something that failed, and what comes while
+    /// it is being applied.
+    Elsewhere,
     /// A coordinator could not be entered.
     Entered,
     /// Whether what a configuration stands for becomes true where others change what it looks at.
@@ -138,6 +141,11 @@ impl Bound {
                 .to_owned(),
             Self::Apart => {
                 "what leads a coordinator on that is down already, while others that it has nothing to do with are not, was not followed"
+                    .to_owned()
+            }
+            Self::Elsewhere => {
+                "what a safe configuration of a coordinator that is followed apart interrupts was not followed behind something that \
+                 failed, nor what comes while it is being applied"
                     .to_owned()
             }
             Self::Entered => "a coordinator could not be entered".to_owned(),

@@ -32,7 +32,7 @@ impl Product<'_> {
                 let confirm = self.worlds.configuration(id).and_then(|configuration| configuration.confirm);
                 confirm.map_or(Raises::Somebody, |confirm| of(confirm.event))
             }
-            Move::Lost(_) => Raises::Sometimes,
+            Move::Lost(_) | Move::Elsewhere(_) => Raises::Sometimes,
             _ => Raises::Somebody,
         }
     }

@@ -163,7 +163,6 @@ impl<'a> Meeting<'a> {
     /// Whether two coordinators have to do with each other.
     fn meets(&self, a: usize, b: usize) -> bool {
         let ((own, claim), (other, theirs)) = (&self.asked[a], &self.asked[b]);
-        let is_safe = |id: &ConfigId| self.deployment.configuration(*id).is_some_and(|c| c.safe);
         let hears = |a: usize, b: usize| {
             let mut raises = self.charts[a].raises().iter();
             raises.any(|site| self.charts[b].event(site.name) != EventId::OTHER)
@@ -179,9 +178,8 @@ impl<'a> Meeting<'a> {
             let heard = |raise| self.charts[to].event(raise) != EventId::OTHER;
             reactions().any(|reaction| heard(reaction.raise) && has(ids, reaction.component))
         };
-        let safe = own.iter().chain(other).any(is_safe);
         let same = own.intersection(other).next().is_some();
-        same || safe || hears(a, b) || hears(b, a) || reports(own, b) || reports(other, a) || claim.meets(theirs)
+        same || hears(a, b) || hears(b, a) || reports(own, b) || reports(other, a) || claim.meets(theirs)
     }
 
     /// Whether what a coordinator does and this, done by an operator, have to do with each other.
@@ -198,8 +196,9 @@ fn claimed(claims: &Claims, ids: &BTreeSet<ConfigId>) -> Claim {
 }
 
 /// The coordinators in groups that have nothing to do with each other: they touch nothing in common, hear nothing of each
-/// other, no safe configuration of one interrupts another, and nothing that an operator may apply touches what both touch. What
-/// holds of each group holds of all together, but for when all of them are *down* at once (`Graph::goes_on_when_down`).
+/// other, and nothing that an operator may apply touches what both touch. That a safe configuration of one group interrupts what is under
+/// way of another one is followed as something that may come at any time ([`safe_elsewhere`]). What holds of each group holds of all
+/// together, but for when all of them are *down* at once (`Graph::goes_on_when_down`).
 pub fn groups(deployment: &Deployment, charts: &[&Chart]) -> Vec<Vec<usize>> {
     if charts.len() < 2 {
         return (0..charts.len()).map(|number| vec![number]).collect();
@@ -230,8 +229,19 @@ pub fn is_tied(deployment: &Deployment, charts: &[&Chart], groups: &[Vec<usize>]
     groups.iter().filter(met).count() > 1
 }
 
-/// What of an operator is followed with a group: what touches something that it touches, and what is safe, since that
-/// interrupts everybody. What touches nothing that anybody touches is followed with the first coordinator.
+/// A safe configuration that touches nothing that a group touches, whoever asks for it: of several one stands for all, since of each
+/// nothing is seen but that it interrupts.
+pub fn safe_elsewhere(deployment: &Deployment, charts: &[&Chart], numbers: &[usize]) -> Option<ConfigId> {
+    if numbers.len() == charts.len() {
+        return None;
+    }
+    let meeting = Meeting::of(deployment, charts);
+    let met = |id: ConfigId| numbers.iter().any(|number| meeting.is_met(*number, id));
+    deployment.configurations.iter().filter(|c| c.safe).map(|c| c.id).find(|id| !met(*id))
+}
+
+/// What of an operator is followed with a group: what touches something that it touches. What touches nothing that anybody touches is
+/// followed with the first coordinator; what is safe and touches nothing of a group is what interrupts it ([`safe_elsewhere`]).
 pub fn operated(deployment: &Deployment, charts: &[&Chart], numbers: &[usize]) -> Vec<ConfigId> {
     let ids = by_operator(deployment);
     if numbers.len() == charts.len() {
@@ -240,8 +250,9 @@ pub fn operated(deployment: &Deployment, charts: &[&Chart], numbers: &[usize]) -
     let meeting = Meeting::of(deployment, charts);
     let followed = |id: &ConfigId| {
         let mut met = (0..charts.len()).filter(|number| meeting.is_met(*number, *id)).peekable();
-        let nobody = met.peek().is_none() && numbers.contains(&0);
-        nobody || met.any(|number| numbers.contains(&number)) || deployment.configuration(*id).is_some_and(|c| c.safe)
+        let safe = deployment.configuration(*id).is_some_and(|c| c.safe);
+        let nobody = met.peek().is_none() && numbers.contains(&0) && !safe;
+        nobody || met.any(|number| numbers.contains(&number))
     };
     ids.into_iter().filter(followed).collect()
 }

@@ -28,6 +28,8 @@ pub struct Effort<'e> {
     /// What failed undos leave is known one at a time where so many configurations may be left, at least ([`undo_failed`](super::undo_failed)); where
     /// they are fewer, following every subset of them is less.
     pub aside_from: usize,
+    /// Coordinators that have nothing to do with each other are followed together all the same.
+    pub together: bool,
     /// Told every few thousand states how far it is; an error ends it there, and what was left out is said.
     pub goes_on: &'e dyn Fn(Far) -> Result<(), Halt>,
 }
@@ -35,7 +37,12 @@ pub struct Effort<'e> {
 impl Default for Effort<'_> {
     /// [`limits::CHECK_TRANSITIONS`], and to the end.
     fn default() -> Self {
-        Self { transitions: limits::CHECK_TRANSITIONS, aside_from: limits::CHECK_ASIDE, goes_on: &|_| Ok(()) }
+        Self {
+            transitions: limits::CHECK_TRANSITIONS,
+            aside_from: limits::CHECK_ASIDE,
+            together: false,
+            goes_on: &|_| Ok(()),
+        }
     }
 }
 

@@ -325,12 +325,19 @@ impl Graph<'_, '_> {
     /// What follows from a state: always the same.
     pub(super) fn nexts(&mut self, at: u32) -> Nexts {
         let state = self.states[at as usize].clone();
+        self.product.minds_elsewhere = self.failed[at as usize] == Failed::Nothing;
+        let nexts = self.nexts_of(at, &state);
+        self.product.minds_elsewhere = true;
+        nexts
+    }
+
+    fn nexts_of(&mut self, at: u32, state: &ProductState) -> Nexts {
         if !self.is_lean(at) {
-            return self.product.nexts(&state);
+            return self.product.nexts(state);
         }
         let most = std::mem::replace(&mut self.product.most_waiting, 1);
         self.product.races = false;
-        let nexts = self.product.nexts(&state);
+        let nexts = self.product.nexts(state);
         self.product.most_waiting = most;
         self.product.races = true;
         nexts

@@ -19,18 +19,37 @@ impl Product<'_> {
         self.events_come(state, heard, nexts);
         self.notices(state, nexts);
         self.operators(state, nexts);
+        self.safe_comes_elsewhere(state, nexts);
         if self.others
             && state.is_at_rest()
             && self.all_down(state)
             && let Some(world) = self.worlds.settle_down(state.world)
-            && world != state.world
+            && (world != state.world || state.stopping)
         {
             let mut next = state.clone();
             next.world = world;
+            (next.stopping, next.elsewhere) = (false, false);
             next.leaving = false;
             next.unconfirmed.clear();
             self.review_standings(&mut next);
             nexts.all.push(Next::plain(Move::OthersDown, next, Failed::Nothing));
+        }
+    }
+
+    /// A safe configuration comes of those who have nothing to do with these, and is over at once: it interrupts what is under way,
+    /// cancels what waits, and changes nothing else here. Where nothing is under way it makes no difference.
+    fn safe_comes_elsewhere(&mut self, state: &ProductState, nexts: &mut Nexts) {
+        let Some(id) = self.elsewhere.filter(|_| self.minds_elsewhere && !state.desk.is_empty()) else { return };
+        let request = Request::new(RequestId(0), Ask::Apply(id), Requester::Safety);
+        for mut next in self.arrive(state.clone(), Batch::one(request)) {
+            // What is on its way only is what comes a moment later.
+            if !next.in_transit.is_empty() {
+                continue;
+            }
+            next.safe.retain(|safe| safe.requester != Requester::Safety);
+            next.elsewhere = next.stopping;
+            self.begin(&mut next);
+            nexts.all.push(Next::plain(Move::Elsewhere(id), self.settle(next), Failed::Apply));
         }
     }
 
@@ -71,6 +90,10 @@ impl Product<'_> {
         let busy: SmallVec<[bool; 4]> = (0..self.members.len()).map(|number| self.is_busy(state, number)).collect();
         for at in heard {
             let name = self.outside[at];
+            if self.elsewhere.is_some() && state.stopping && name == self.deployment.deploy.event {
+                // It is refused until the others have come down as well.
+                continue;
+            }
             let takes =
                 |(number, member): (usize, &mut Member<'_>)| busy[number] && member.takes(state.leaves[number], name);
             if self.members.iter_mut().enumerate().any(takes) {

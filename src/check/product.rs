@@ -46,6 +46,10 @@ pub struct Product<'a> {
     pub operator: Vec<ConfigId>,
     /// There are coordinators that have nothing to do with these, and are not followed with them.
     pub others: bool,
+    /// A safe configuration that has nothing to do with these: of what it does they know only that it interrupts them.
+    pub(super) elsewhere: Option<ConfigId>,
+    /// That is followed: not behind something that failed.
+    pub(super) minds_elsewhere: bool,
     /// More was on its way between coordinators than is followed.
     pub overflow: bool,
     /// One step asks for more than is followed, or may meet in more ways what is under way.
@@ -117,6 +121,8 @@ impl<'a> Product<'a> {
             alike: Vec::new(),
             operator,
             others: numbers.len() < deployment.coordinators.len(),
+            elsewhere: coupling::safe_elsewhere(deployment, charts, numbers),
+            minds_elsewhere: true,
             overflow: false,
             forked: false,
             races: true,
@@ -187,6 +193,7 @@ impl<'a> Product<'a> {
             down: 0,
             stopping: false,
             leaving: false,
+            elsewhere: false,
             moved: 0,
             across: false,
             in_transit: SharedList::new(),
@@ -281,7 +288,10 @@ impl<'a> Product<'a> {
     /// What batches and safe configurations that stopped at last come to is decided in `ends`; this settles what needs no
     /// decision: who comes to *down*, and when the deployment is down.
     pub(super) fn settle(&mut self, mut state: ProductState) -> ProductState {
-        state.stopping &= !(state.is_at_rest() && self.all_in(&state, |member| member.down));
+        // Where others are still to come down, the deployment is being stopped until they have.
+        state.stopping &=
+            self.elsewhere.is_some() || !(state.is_at_rest() && self.all_in(&state, |member| member.down));
+        state.elsewhere &= state.stopping;
         if state.inbox.is_empty() {
             (state.moved, state.across) = (0, false);
         }

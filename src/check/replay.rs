@@ -383,6 +383,9 @@ impl Product<'_> {
                 }
             }
             Move::Rounds => Does::Cannot("the same happens again and again, until frames are squashed"),
+            Move::Elsewhere(_) => {
+                Does::Cannot("a safe configuration of coordinators that are followed apart comes just then")
+            }
             Move::OthersDown if self.was_ended(way) => Does::OthersDown,
             Move::OthersDown => Does::Cannot("nobody has told the other coordinators to come down"),
             Move::Time(..) | Move::Taken(..) | Move::Answer => Does::Nothing,

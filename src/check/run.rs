@@ -121,7 +121,7 @@ fn follow(
         left.insert(bound.told(Failed::Nothing, 0, effort.transitions));
         explored.complete = false;
     }
-    let groups = coupling::groups(deployment, charts);
+    let groups = if effort.together { vec![all.clone()] } else { coupling::groups(deployment, charts) };
     if groups.len() > 1 && !coupling::by_operator(deployment).is_empty() {
         left.insert(Bound::Begun.told(Failed::Nothing, 0, effort.transitions));
         explored.complete = false;
@@ -166,6 +166,9 @@ fn follow(
             }
             if !minds {
                 graph.cut(Bound::Stopping, Failed::Nothing);
+            }
+            if graph.product.elsewhere.is_some() {
+                graph.cut(Bound::Elsewhere, Failed::Nothing);
             }
             if graph.product.others && graph.goes_on_when_down(true) {
                 graph.cut(Bound::Apart, Failed::Nothing);

@@ -4,7 +4,8 @@ use super::equivalence::{FrameBook, FrameNumber};
 use crate::model::ConfigId;
 use crate::stack::{Frame, FrameId, Requester, Stack, calls, is_kept, staying};
 use crate::system::Slot;
-use rustc_hash::FxHashSet;
+use rustc_hash::{FxHashMap, FxHashSet};
+use smallvec::SmallVec;
 use std::sync::Arc;
 
 /// A frame that counts: its content, whether frames that do not count keep it from being undone, and which of its values
@@ -47,25 +48,95 @@ pub struct Shapes {
 #[derive(Default)]
 struct Orders {
     /// Of frames that count.
-    met: FxHashSet<(ConfigId, ConfigId)>,
+    met: ConfigPairs,
     /// As which they were taken instead, since it makes no difference to who undoes them.
-    taken_as: FxHashSet<(ConfigId, ConfigId)>,
+    taken_as: ConfigPairs,
     /// Of one that counts and one that does not: which lies lower is not looked at.
-    beside: FxHashSet<(ConfigId, ConfigId)>,
+    beside: ConfigPairs,
+}
+
+/// Pairs of configurations. What lies below a frame is noted at once, for each of thousands of stacks.
+#[derive(Default)]
+struct ConfigPairs {
+    numbers: FxHashMap<ConfigId, usize>,
+    /// Of each upper one, the lower ones by their numbers.
+    lower: Vec<ConfigBits>,
+}
+
+/// Configurations by their numbers, a bit each.
+#[derive(Default, Clone)]
+struct ConfigBits(SmallVec<[u64; 2]>);
+
+impl ConfigBits {
+    fn insert(&mut self, number: usize) {
+        if self.0.len() <= number / 64 {
+            self.0.resize(number / 64 + 1, 0);
+        }
+        self.0[number / 64] |= 1 << (number % 64);
+    }
+
+    fn extend(&mut self, more: &Self) {
+        if self.0.len() < more.0.len() {
+            self.0.resize(more.0.len(), 0);
+        }
+        self.0.iter_mut().zip(&more.0).for_each(|(own, more)| *own |= more);
+    }
+
+    fn contains(&self, number: usize) -> bool {
+        self.0.get(number / 64).is_some_and(|bits| bits & (1 << (number % 64)) != 0)
+    }
+}
+
+impl ConfigPairs {
+    fn number(&mut self, id: ConfigId) -> usize {
+        let next = self.numbers.len();
+        let number = *self.numbers.entry(id).or_insert(next);
+        if number == next {
+            self.lower.push(ConfigBits::default());
+        }
+        number
+    }
+
+    fn insert(&mut self, lower: ConfigId, upper: ConfigId) {
+        let (lower, upper) = (self.number(lower), self.number(upper));
+        self.lower[upper].insert(lower);
+    }
+
+    fn contains(&self, lower: ConfigId, upper: ConfigId) -> bool {
+        let (Some(lower), Some(upper)) = (self.numbers.get(&lower), self.numbers.get(&upper)) else { return false };
+        self.lower[*upper].contains(*lower)
+    }
+
+    fn iter(&self) -> impl Iterator<Item = (ConfigId, ConfigId)> + '_ {
+        let all = || self.numbers.iter();
+        let of = move |(id, number): (&ConfigId, &usize)| {
+            let (id, bits) = (*id, &self.lower[*number]);
+            all().filter(|(_, other)| bits.contains(**other)).map(move |(other, _)| (*other, id))
+        };
+        self.numbers.iter().flat_map(of)
+    }
 }
 
 impl Orders {
     fn note(&mut self, frames: &[Arc<Frame>], counts: &[bool]) {
-        let own = |at: &usize| counts[*at];
-        for (at, one) in (0..frames.len()).filter(own).map(|at| (at, &frames[at])) {
-            for (other, frame) in frames.iter().enumerate().filter(|(_, frame)| frame.requester == one.requester) {
-                let pair = if other < at { (frame, one) } else { (one, frame) };
-                let pair = (pair.0.configuration, pair.1.configuration);
-                match counts[other] {
-                    true if at < other => _ = self.met.insert(pair),
-                    false => _ = self.beside.insert(pair),
-                    true => {}
-                }
+        // Of each requester what lies below, that which counts and that which does not: numbers of `met` and of `beside`.
+        let mut below: SmallVec<[(Requester, ConfigBits, ConfigBits, ConfigBits); 2]> = SmallVec::new();
+        for (frame, counts) in frames.iter().zip(counts) {
+            let place = below.iter().position(|(by, ..)| *by == frame.requester).unwrap_or_else(|| {
+                below.push((frame.requester, ConfigBits::default(), ConfigBits::default(), ConfigBits::default()));
+                below.len() - 1
+            });
+            let (_, met, counted, uncounted) = &mut below[place];
+            let beside = self.beside.number(frame.configuration);
+            if *counts {
+                let number = self.met.number(frame.configuration);
+                self.met.lower[number].extend(met);
+                met.insert(number);
+                self.beside.lower[beside].extend(uncounted);
+                counted.insert(beside);
+            } else {
+                self.beside.lower[beside].extend(counted);
+                uncounted.insert(beside);
             }
         }
     }
@@ -121,8 +192,9 @@ impl Shapes {
                 }
             }
             let (frame, one) = kept.remove(least);
-            let passed = kept[..least].iter().filter(|(below, _)| below.requester == frame.requester);
-            self.orders.taken_as.extend(passed.map(|(below, _)| (frame.configuration, below.configuration)));
+            for (below, _) in kept[..least].iter().filter(|(below, _)| below.requester == frame.requester) {
+                self.orders.taken_as.insert(frame.configuration, below.configuration);
+            }
             counted.push(one);
             ids.push(frame.id);
         }
@@ -133,8 +205,8 @@ impl Shapes {
     /// then are not undone by themselves any more, is known for one of these orders.
     pub fn mixes_orders(&self) -> bool {
         let Orders { met, taken_as, beside } = &self.orders;
-        let both = |(a, b): &(ConfigId, ConfigId)| a != b && beside.contains(&(*b, *a));
-        taken_as.intersection(met).next().is_some() || beside.iter().any(both)
+        taken_as.iter().any(|(lower, upper)| met.contains(lower, upper))
+            || beside.iter().any(|(lower, upper)| lower != upper && beside.contains(upper, lower))
     }
 
     /// Whether it makes no difference which of two frames lies above the other: they share nothing, and are not undone by

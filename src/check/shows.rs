@@ -112,6 +112,8 @@ impl Shows {
                 !self.unknown && !own_time && !waits && !behind && !races()
             }
             Move::Lost(id) if product.loss(before, id).is_none() => false,
+            // When that comes is up to others.
+            Move::Elsewhere(_) => false,
             _ => !self.at_once && !self.answers && !self.unhandled && !races(),
         }
     }

@@ -86,6 +86,8 @@ pub struct ProductState {
     /// The same as the configurator knows it: until all coordinators have come to *down*. Kept only where an operator may have
     /// put something in their way.
     pub leaving: bool,
+    /// A safe configuration of those who have nothing to do with these has come since it is being stopped, and is in force.
+    pub elsewhere: bool,
     /// Coordinators that have moved since the inboxes were empty, by their bits. Kept only where events come meanwhile.
     pub moved: u64,
     /// One came meanwhile.
@@ -170,6 +172,8 @@ pub enum Move {
     Operator(Ask),
     /// Coordinators that have nothing to do with these are down as well.
     OthersDown,
+    /// A safe configuration comes that has nothing to do with these, and interrupts what is under way.
+    Elsewhere(ConfigId),
     /// The same cycle again and again, until frames are squashed.
     Rounds,
 }

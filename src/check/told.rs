@@ -118,6 +118,7 @@ impl Product<'_> {
             Move::Lost(id) => Happened::Lost { configuration: id.to_string() },
             Move::Operator(ask) => Happened::Operator { request: ask.command() },
             Move::OthersDown => Happened::Down,
+            Move::Elsewhere(id) => Happened::Elsewhere { configuration: id.to_string() },
             Move::Rounds => Happened::Rounds { times: self.deployment.limits.stack },
         }
     }

@@ -94,6 +94,11 @@ pub enum Happened {
     },
     /// Coordinators that have nothing to do with these are down as well: what was in force is forgotten.
     Down,
+    /// A safe configuration that has nothing to do with these interrupts what is under way.
+    Elsewhere {
+        /// The configuration.
+        configuration: String,
+    },
 }
 
 /// A request that is answered.
@@ -193,6 +198,7 @@ impl fmt::Display for TraceStep {
             Happened::Operator { request } => write!(f, "operator: {request}")?,
             Happened::Rounds { times } => write!(f, "the same {times} times")?,
             Happened::Down => f.write_str("the others are down")?,
+            Happened::Elsewhere { configuration } => write!(f, "`{configuration}` interrupts")?,
         }
         f.write_str(" → ")?;
         for (i, place) in self.states.iter().enumerate() {

@@ -5,6 +5,7 @@
 mod demo;
 
 mod advice;
+mod apart;
 mod aside;
 mod asked;
 mod beside;

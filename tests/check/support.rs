@@ -112,6 +112,7 @@ shutdown: {{ event: e_shutdown, down: [{}], within_s: 5 }}\n{keys}",
                     "so long",
                     "goes back",
                     "round for ever",
+                    "followed apart",
                 ];
                 assert!(reasons.iter().any(|why| made.err.contains(why)), "{}", made.err);
                 continue;

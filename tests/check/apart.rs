@@ -1,0 +1,114 @@
+//! Coordinators that have nothing in common but that a safe configuration of one interrupts the other are followed apart.
+
+use crate::aside::Chance;
+use crate::support::Small;
+use davit::check::{Effort, Report, run_with};
+use davit::model::Severity;
+use std::collections::BTreeSet;
+
+/// A drive with a coordinator of its own: it is made, and stopped by its own safe configuration where that is asked for. `heard` are
+/// further answers of its making, `leaves` of the undoing.
+fn drive(name: &str, heard: &str, leaves: &str) -> (String, String) {
+    let configurations = format!(
+        "{name}_base = Configuration {{ create('{name}', 'Drive') }},
+         {name}_calm = Configuration {{ safe = true, property_set('{name}.gain', 0.0) }},\n"
+    );
+    let coordinator = format!(
+        "idle = state {{}}, starting = state {{ entry = '{name}_base' }}, up = state {{}},
+         stopped = state {{ entry = '{name}_calm' }}, leaving = state {{ entry = '{name}_base.undo' }},
+         released = state {{ entry = '{name}_calm.undo' }},
+         trans {{ src = 'initial', tgt = 'idle' }},
+         trans {{ src = 'idle', tgt = 'starting', events = {{ 'e_start' }} }},
+         trans {{ src = 'starting', tgt = 'up', events = {{ '{name}_base.ok' }} }},
+         trans {{ src = 'starting', tgt = 'idle', events = {{ '{name}_base.failed'{heard} }} }},
+         trans {{ src = 'starting', tgt = 'leaving', events = {{ '{name}_base.broken' }} }},
+         trans {{ src = 'up', tgt = 'stopped', events = {{ 'e_{name}_stop' }} }},
+         trans {{ src = 'up', tgt = 'leaving', events = {{ 'e_shutdown' }} }},
+         trans {{ src = 'stopped', tgt = 'released', events = {{ 'e_shutdown' }} }},
+         trans {{ src = 'released', tgt = 'leaving', events = {{ '{name}_calm.undone', '{name}_calm.undo.failed', '{name}_calm.undo.broken' }} }},
+         trans {{ src = 'leaving', tgt = 'idle', events = {{ '{name}_base.undone'{leaves} }} }},"
+    );
+    (configurations, coordinator)
+}
+
+const HEARD: &str = ", '{name}_base.cancelled'";
+const LEAVES: &str = ", '{name}_base.undo.failed', '{name}_base.undo.broken'";
+
+fn drives(parts: &[(&str, &str, &str)]) -> Small {
+    let made: Vec<_> = (parts.iter())
+        .map(|(name, heard, leaves)| {
+            (name, drive(name, &heard.replace("{name}", name), &leaves.replace("{name}", name)))
+        })
+        .collect();
+    let configurations: String = made.iter().map(|(_, (configurations, _))| configurations.as_str()).collect();
+    let coordinators: Vec<(&str, &str)> =
+        made.iter().map(|(name, (_, coordinator))| (**name, coordinator.as_str())).collect();
+    Small::several(&configurations, &coordinators, "")
+}
+
+fn followed(small: &Small, together: bool) -> Report {
+    let read = small.read();
+    run_with(read.deployment, &read.catalogue, Effort { together, transitions: 300_000, ..Effort::default() })
+}
+
+/// Three cost three times what one costs, and not the product.
+#[test]
+fn a_safe_configuration_joins_nobody() {
+    let of = |names: &[&str]| {
+        let parts: Vec<_> = names.iter().map(|name| (*name, HEARD, LEAVES)).collect();
+        followed(&drives(&parts), false).explored
+    };
+    let (two, three) = (of(&["a", "b"]), of(&["a", "b", "c"]));
+    assert_eq!(two.states * 3, three.states * 2);
+    assert_eq!(two.transitions * 3, three.transitions * 2);
+}
+
+/// What it interrupts of the other one is followed: that it was cancelled before it began is to be heard there.
+#[test]
+fn what_a_safe_configuration_of_another_one_interrupts_is_known() {
+    let said = |parts: &[(&str, &str, &str)]| -> Vec<String> {
+        let report = followed(&drives(parts), false);
+        let way = |at: usize| report.traces[at].iter().map(ToString::to_string).collect::<Vec<_>>().join("; ");
+        let all = report.findings.iter().enumerate();
+        all.filter(|(_, f)| f.severity > Severity::Info).map(|(at, f)| format!("{}: {}", f.message, way(at))).collect()
+    };
+    let told = said(&[("a", "", LEAVES), ("b", HEARD, LEAVES)]);
+    assert!(told.iter().any(|told| told.contains("`b_calm` interrupts")), "{told:#?}");
+    assert!(!said(&[("a", HEARD, LEAVES), ("b", HEARD, LEAVES)]).iter().any(|told| told.contains("interrupts")));
+}
+
+/// What the product of both finds is found where each is followed alone.
+#[test]
+fn apart_finds_what_together_does() {
+    let mut wrong = Vec::new();
+    let (mut compared, mut found) = (0, 0);
+    for seed in 0..40 {
+        let mut chance = Chance(seed * 7919 + 11);
+        let mut part = |name: &'static str| {
+            let heard = if chance.percent(50) { HEARD } else { "" };
+            let leaves = [LEAVES, "", ", '{name}_base.undo.failed'", ", '{name}_base.undo.broken'"][chance.below(4)];
+            (name, heard, leaves)
+        };
+        let small = drives(&[part("a"), part("b")]);
+        let (plain, apart) = (followed(&small, true), followed(&small, false));
+        if plain.left.iter().any(|left| left.contains("--budget")) {
+            continue;
+        }
+        compared += 1;
+        let codes = |report: &Report| -> BTreeSet<String> {
+            let of = |f: &davit::model::Finding| (f.severity > Severity::Info).then(|| f.code.to_string());
+            report.findings.iter().filter_map(of).collect()
+        };
+        let (with, without) = (codes(&plain), codes(&apart));
+        found += usize::from(!with.is_empty());
+        if !with.is_subset(&without) {
+            let told = |report: &Report| {
+                report.findings.iter().map(|f| format!("{:?} {}", f.severity, f.message)).collect::<Vec<_>>()
+            };
+            wrong.push(format!("{seed}: together {:#?}, apart {:#?}", told(&plain), told(&apart)));
+        }
+        assert!(apart.explored.states < plain.explored.states, "{seed}");
+    }
+    assert!(wrong.is_empty(), "{} differ: {}", wrong.len(), wrong.join("\n"));
+    assert!(compared > 20 && found > 10, "{compared} compared, {found} with findings");
+}
