@@ -1,8 +1,11 @@
 //! What checking costs: states a second and bytes a state, for generated families and the shipped deployments.
 //!
 //! A family: a hub and n modes, each of which a state brings with it and each of whose undos may fail; and coordinators of ten such
-//! modes each beside each other that have nothing to do with each other. `cargo bench --bench check`; other files by
+//! modes each beside each other that have nothing to do with each other; and two youBots written flat. `cargo bench --bench check`; other files by
 //! `cargo bench --bench check -- FILE…`.
+
+#[path = "../tests/support/flat.rs"]
+mod flat;
 
 use davit::app;
 use davit::check::run;
@@ -140,6 +143,8 @@ fn main() {
         let folder = tempfile::tempdir().expect("a folder of ours");
         row(&format!("{coordinators} x {n} modes"), &write(folder.path(), coordinators, n));
     }
+    let folder = tempfile::tempdir().expect("a folder of ours");
+    row("two youBots", &flat::youbots(folder.path(), &["l_", "r_"]));
     for name in ["hello", "youbot_arm", "youbot_arm_scoped", "generic_arm"] {
         row(name, &Path::new(env!("CARGO_MANIFEST_DIR")).join("deployments").join(name).with_extension("yaml"));
     }

@@ -82,7 +82,7 @@ fn memory(bytes: u64) -> String {
     format!("{}{unit}", bytes / times)
 }
 
-/// As it is read: `500000`, `500000,2GB`.
+/// As it is read: `600000`, `600000,2GB`.
 impl std::fmt::Display for CheckBudget {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{}", self.transitions)?;
@@ -207,9 +207,9 @@ mod tests {
             ("2M", 2_000_000, None, "2000000"),
             ("0.5k", 500, None, "500"),
             ("1.25g", 1_000_000_000, None, ""),
-            ("2 GB", limits::CHECK_TRANSITIONS, Some(2_000_000_000), "500000,2GB"),
+            ("2 GB", limits::CHECK_TRANSITIONS, Some(2_000_000_000), "600000,2GB"),
             ("1.5GB, 7", 7, Some(1_500_000_000), "7,1500MB"),
-            ("9B", limits::CHECK_TRANSITIONS, Some(9), "500000,9B"),
+            ("9B", limits::CHECK_TRANSITIONS, Some(9), "600000,9B"),
         ] {
             match text.parse::<CheckBudget>() {
                 Ok(budget) => {

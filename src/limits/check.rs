@@ -2,7 +2,7 @@
 
 /// Events and answers that `check` follows through a coordinator before it says that it has not seen everything, unless
 /// `--budget` says otherwise. About a second of work; one robot of the youBot coupling beside another one needs 364,000.
-pub const CHECK_TRANSITIONS: usize = 500_000;
+pub const CHECK_TRANSITIONS: usize = 600_000;
 
 /// The largest number of transitions that `--budget` takes.
 pub const CHECK_TRANSITIONS_MOST: usize = 1_000_000_000;

@@ -1,6 +1,7 @@
 //! Coordinators that have nothing in common but that a safe configuration of one interrupts the other are followed apart.
 
 use crate::aside::Chance;
+use crate::flat;
 use crate::support::Small;
 use davit::check::{Effort, Report, run_with};
 use davit::model::Severity;
@@ -111,4 +112,24 @@ fn apart_finds_what_together_does() {
     }
     assert!(wrong.is_empty(), "{} differ: {}", wrong.len(), wrong.join("\n"));
     assert!(compared > 20 && found > 10, "{compared} compared, {found} with findings");
+}
+
+/// Two youBots written flat are followed to their end, each for itself; and it is found that one's stop cancels what the other one is
+/// doing, where nobody there hears that.
+#[test]
+fn two_youbots_side_by_side_are_followed_to_their_end() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = flat::youbots(folder.path(), &["l_", "r_"]);
+    let read = davit::app::read(&file, &davit::lang::LoadOptions::default(), davit::libraries::builtin());
+    let read = read.unwrap_or_else(|_| panic!("it is readable"));
+    let report = run_with(read.deployment, &read.catalogue, Effort::default());
+    assert_eq!(report.explored.unfollowed, 0, "{:?}", report.explored);
+    assert!(!report.left.iter().any(|left| left.contains("--budget")), "{:?}", report.left);
+    let told: Vec<&str> = (report.findings.iter())
+        .filter(|finding| finding.severity > Severity::Info)
+        .map(|finding| finding.message.as_str())
+        .collect();
+    let stuck = "what `root.shutting_down.unwiring.braked.waiting` waits for never comes: `l_base_stop.broken`";
+    assert!(told.iter().any(|told| told.starts_with(stuck)), "{told:#?}");
+    assert!(told.iter().all(|told| told.contains("unwiring") || told.contains("destroying")), "{told:#?}");
 }

@@ -4,6 +4,9 @@
 #[allow(dead_code)]
 mod demo;
 
+#[path = "../support/flat.rs"]
+mod flat;
+
 mod advice;
 mod apart;
 mod aside;

@@ -62,7 +62,7 @@ fn a_budget_that_is_none_is_told() {
         assert!(ran.code == 2 && ran.err.contains(told), "{budget}: {}", ran.err);
     }
     let help = at_home(&["check", "--help"]).out;
-    assert!(help.contains("[default: 500000]"), "{help}");
+    assert!(help.contains("[default: 600000]"), "{help}");
 }
 
 /// The first signal tells what was found so far.
