@@ -4,6 +4,7 @@
 //! A cycle is gone round for each configuration that is pushed on it, in each world in which it is, up to a bound. What else
 //! is pushed on another cycle with the same push in the same world is followed for that.
 
+use super::adjacency::Adjacency;
 use super::bound::Bound;
 use super::explore::{Edge, Graph, NOWHERE};
 use super::outcome::EMPTY;
@@ -13,11 +14,15 @@ use crate::stack::{Request, World};
 use petgraph::algo::kosaraju_scc;
 use petgraph::graph::DiGraph;
 use rustc_hash::FxHashMap;
-use smallvec::SmallVec;
 use std::collections::VecDeque;
 
-/// The edges of cycles on which no undo fails, by where they come from.
-type Cyclic = FxHashMap<u32, SmallVec<[u32; 4]>>;
+/// The cycles on which no undo fails.
+struct Cycles {
+    /// The numbers of their edges, by where these come from.
+    edges: Adjacency,
+    /// Of each state, on which it is.
+    of: Vec<u32>,
+}
 
 impl Graph<'_, '_> {
     /// Goes round cycles that were met since. True: there is more to follow.
@@ -35,7 +40,7 @@ impl Graph<'_, '_> {
             return false;
         }
         pushes.sort_unstable_by_key(|((id, by), _)| (*id, *by));
-        let (cyclic, of) = self.cyclic();
+        let cycles = self.cyclic();
         let before = self.edges.len();
         let easy = before <= limits::CHECK_EASY;
         let most = if easy { limits::CHECK_ROUNDS } else { 1 };
@@ -46,7 +51,9 @@ impl Graph<'_, '_> {
             for edge in edges {
                 let Edge { from, to, .. } = self.edges[edge as usize];
                 let (class, world) = (self.failed[from as usize], self.states[from as usize].world);
-                if of.get(&from).is_none_or(|cycle| of.get(&to) != Some(cycle)) {
+                // What was met since is on none of them.
+                let on = |at: u32| cycles.of.get(at as usize).copied().unwrap_or(NOWHERE);
+                if on(from) == NOWHERE || on(from) != on(to) {
                     continue;
                 }
                 let gone = self.gone_round.entry((id, by)).or_default();
@@ -62,7 +69,7 @@ impl Graph<'_, '_> {
                     continue;
                 }
                 let cycle = worsts.iter().find_map(|worst| {
-                    let cycle = self.cycle(edge, &cyclic, *worst)?;
+                    let cycle = self.cycle(edge, &cycles, *worst)?;
                     Some((cycle, *worst))
                 });
                 let Some((cycle, worst)) = cycle else {
@@ -81,27 +88,24 @@ impl Graph<'_, '_> {
     }
 
     /// The edges of cycles on which no undo fails and something stays in force, and which states are on one cycle.
-    fn cyclic(&self) -> (Cyclic, FxHashMap<u32, usize>) {
+    fn cyclic(&self) -> Cycles {
         let fits = |edge: &Edge| {
             // Where nothing is left, frames are forgotten: they do not pile up.
             edge.failed <= Failed::Apply && edge.place.is_some() && self.states[edge.to as usize].world != EMPTY
         };
         let all = self.edges.iter().filter(|edge| fits(edge)).map(|edge| (edge.from, edge.to));
-        let mut of: FxHashMap<u32, usize> = FxHashMap::default();
-        for (number, states) in kosaraju_scc(&DiGraph::<(), ()>::from_edges(all)).into_iter().enumerate() {
-            of.extend(states.into_iter().filter_map(|at| Some((u32::try_from(at.index()).ok()?, number))));
+        let mut of = vec![NOWHERE; self.states.len()];
+        for (number, states) in (0..).zip(kosaraju_scc(&DiGraph::<(), ()>::from_edges(all))) {
+            states.into_iter().for_each(|at| of[at.index()] = number);
         }
-        let mut cyclic = Cyclic::default();
-        for (number, edge) in (0u32..).zip(&self.edges) {
-            if fits(edge) && of.get(&edge.from) == of.get(&edge.to) {
-                cyclic.entry(edge.from).or_default().push(number);
-            }
-        }
-        (cyclic, of)
+        let on_one = |edge: &Edge| fits(edge) && of[edge.from as usize] == of[edge.to as usize];
+        let edges = (0u32..).zip(&self.edges).filter(|(_, edge)| on_one(edge));
+        let edges = Adjacency::new(self.states.len(), edges.map(|(number, edge)| (edge.from, number)));
+        Cycles { edges, of }
     }
 
     /// The edges of a cycle that ends with this one, on which nothing fails that is worse.
-    fn cycle(&self, edge: u32, cyclic: &Cyclic, worst: Failed) -> Option<Vec<u32>> {
+    fn cycle(&self, edge: u32, cycles: &Cycles, worst: Failed) -> Option<Vec<u32>> {
         let Edge { from: goal, to: start, failed, .. } = self.edges[edge as usize];
         if failed > worst || self.failed[start as usize] > worst {
             return None;
@@ -120,7 +124,7 @@ impl Graph<'_, '_> {
                 cycle.reverse();
                 return Some(cycle);
             }
-            for number in cyclic.get(&at).into_iter().flatten() {
+            for number in cycles.edges.of(at) {
                 let Edge { to, failed, .. } = self.edges[*number as usize];
                 if failed <= worst && to != start && !by.contains_key(&to) {
                     by.insert(to, *number);

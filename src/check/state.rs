@@ -101,12 +101,14 @@ impl ProductState {
     pub fn outstanding(&self, by: Requester) -> usize {
         let first = |batch: &&Batch| batch.requests.first().is_some_and(|request| request.requester == by);
         let under_way = self.desk.under_way().iter().map(|active| &active.batch);
-        let (downs, batches): (Vec<&Batch>, Vec<&Batch>) =
-            under_way.chain(self.desk.waiting()).filter(first).partition(|batch| batch.requests[0].why == Why::Down);
+        let (mut downs, mut batches) = (0_usize, 0);
+        for batch in under_way.chain(self.desk.waiting()).filter(first) {
+            *(if batch.requests[0].why == Why::Down { &mut downs } else { &mut batches }) += 1;
+        }
         let due = usize::from(self.is_owed(by));
         let safe = self.safe.iter().filter(|request| request.requester == by).count();
         let given_up = self.undos().filter(|undo| undo.requester == by).count();
-        batches.len() + downs.len().saturating_sub(1) + due + safe + given_up
+        batches + downs.saturating_sub(1) + due + safe + given_up
     }
 
     /// Whether an answer to a requester is on its way: what the configurator answers it later comes after that.
