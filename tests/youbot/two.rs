@@ -78,8 +78,29 @@ impl Robot {
         named.replace("\n@\n", "\n")
     }
 
+    /// One that was led down alone stays down: until the other one is down as well, what it did before is in force, and `check` finds
+    /// what is refused because of that when it is brought up again.
     fn coordinator(&self) -> String {
-        literals(&shipped("coordinator.lua"), |word| {
+        let mut text = shipped("coordinator.lua");
+        for (once, instead) in [
+            (
+                "  idle = state {},",
+                "  idle = state { fresh = state {}, gone = state {}, trans { src = \"initial\", tgt = \"fresh\" } },",
+            ),
+            ("src = \"idle\",      tgt = \"deploying\"", "src = \".idle.fresh\", tgt = \"deploying\""),
+            (
+                "tgt = \"idle\",        events = { \"create_core.undone\" }",
+                "tgt = \".idle.gone\", events = { \"create_core.undone\" }",
+            ),
+            (
+                "tgt = \"idle\", events = { \"destroy_all.ok\" }",
+                "tgt = \".idle.gone\", events = { \"destroy_all.ok\" }",
+            ),
+        ] {
+            assert_eq!(text.matches(once).count(), 1, "{once}");
+            text = text.replace(once, instead);
+        }
+        literals(&text, |word| {
             let (name, _) = word.split_at(word.find('.').unwrap_or(word.len()));
             match word {
                 "e_start" => word.to_owned(),
