@@ -82,6 +82,7 @@ impl Product<'_> {
                 confirm.map(|confirm| confirm.event.to_string()).unwrap_or_default()
             }
             Move::Lost(id) => Verdict::Lost.event(Ask::Apply(id)).to_string(),
+            Move::Elsewhere(id) => id.to_string(),
             _ => String::new(),
         }
     }

@@ -179,7 +179,18 @@ impl<'a> Meeting<'a> {
             reactions().any(|reaction| heard(reaction.raise) && has(ids, reaction.component))
         };
         let same = own.intersection(other).next().is_some();
-        same || hears(a, b) || hears(b, a) || reports(own, b) || reports(other, a) || claim.meets(theirs)
+        // A safe configuration in force keeps what was not confirmed from being taken back, whosever it is, where that moves.
+        let of = |ids: &BTreeSet<ConfigId>, is: fn(&Configuration) -> bool| {
+            ids.iter().any(|id| self.deployment.configuration(*id).is_some_and(is))
+        };
+        let withholds = |a, b| of(a, |c| c.safe) && of(b, |c| c.confirm.is_some());
+        same || withholds(own, other)
+            || withholds(other, own)
+            || hears(a, b)
+            || hears(b, a)
+            || reports(own, b)
+            || reports(other, a)
+            || claim.meets(theirs)
     }
 
     /// Whether what a coordinator does and this, done by an operator, have to do with each other.
@@ -252,7 +263,9 @@ pub fn operated(deployment: &Deployment, charts: &[&Chart], numbers: &[usize]) -
         let mut met = (0..charts.len()).filter(|number| meeting.is_met(*number, *id)).peekable();
         let safe = deployment.configuration(*id).is_some_and(|c| c.safe);
         let nobody = met.peek().is_none() && numbers.contains(&0) && !safe;
-        nobody || met.any(|number| numbers.contains(&number))
+        // One in force withholds reverts that move.
+        let withholds = safe && deployment.configurations.iter().any(|c| c.confirm.is_some());
+        nobody || withholds || met.any(|number| numbers.contains(&number))
     };
     ids.into_iter().filter(followed).collect()
 }

@@ -90,8 +90,7 @@ impl Product<'_> {
         let busy: SmallVec<[bool; 4]> = (0..self.members.len()).map(|number| self.is_busy(state, number)).collect();
         for at in heard {
             let name = self.outside[at];
-            if self.elsewhere.is_some() && state.stopping && name == self.deployment.deploy.event {
-                // It is refused until the others have come down as well.
+            if self.waits_for_others() && state.stopping && name == self.deployment.deploy.event {
                 continue;
             }
             let takes =

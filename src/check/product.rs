@@ -50,6 +50,9 @@ pub struct Product<'a> {
     pub(super) elsewhere: Option<ConfigId>,
     /// That is followed: not behind something that failed.
     pub(super) minds_elsewhere: bool,
+    /// Where others may interrupt these: the event that begins the deployment is followed also while others are led down. It is heard
+    /// then where nobody has asked for the end by more than an event. Makes many states: only where these are few.
+    pub(super) begins_anew: bool,
     /// More was on its way between coordinators than is followed.
     pub overflow: bool,
     /// One step asks for more than is followed, or may meet in more ways what is under way.
@@ -123,6 +126,7 @@ impl<'a> Product<'a> {
             others: numbers.len() < deployment.coordinators.len(),
             elsewhere: coupling::safe_elsewhere(deployment, charts, numbers),
             minds_elsewhere: true,
+            begins_anew: false,
             overflow: false,
             forked: false,
             races: true,
@@ -272,6 +276,11 @@ impl<'a> Product<'a> {
         }
     }
 
+    /// Whether what is down is taken to begin again only when the others are down, too.
+    pub(super) fn waits_for_others(&self) -> bool {
+        self.elsewhere.is_some() && !self.begins_anew
+    }
+
     /// A coordinator hears an event.
     pub(super) fn hear(&mut self, state: ProductState, number: usize, event: EventId, by: Move, nexts: &mut Nexts) {
         for state in self.react(state, number, event) {
@@ -289,8 +298,7 @@ impl<'a> Product<'a> {
     /// decision: who comes to *down*, and when the deployment is down.
     pub(super) fn settle(&mut self, mut state: ProductState) -> ProductState {
         // Where others are still to come down, the deployment is being stopped until they have.
-        state.stopping &=
-            self.elsewhere.is_some() || !(state.is_at_rest() && self.all_in(&state, |member| member.down));
+        state.stopping &= self.waits_for_others() || !(state.is_at_rest() && self.all_in(&state, |member| member.down));
         state.elsewhere &= state.stopping;
         if state.inbox.is_empty() {
             (state.moved, state.across) = (0, false);

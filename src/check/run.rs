@@ -154,6 +154,11 @@ fn follow(
                 product.minds_stopping = true;
                 continue;
             }
+            let waits = graph.product.waits_for_others();
+            if whole && waits && graph.edges.len() <= limits::CHECK_STOPPING {
+                product.begins_anew = true;
+                continue;
+            }
             let few = graph.edges.len() <= limits::CHECK_BY_HAND;
             if whole && graph.bounds.contains_key(&Bound::ByHand) && few && by_hand {
                 product.follows_by_hand = true;
@@ -169,6 +174,9 @@ fn follow(
             }
             if graph.product.elsewhere.is_some() {
                 graph.cut(Bound::Elsewhere, Failed::Nothing);
+            }
+            if waits {
+                graph.cut(Bound::Anew, Failed::Nothing);
             }
             if graph.product.others && graph.goes_on_when_down(true) {
                 graph.cut(Bound::Apart, Failed::Nothing);

@@ -133,3 +133,62 @@ fn two_youbots_side_by_side_are_followed_to_their_end() {
     assert!(told.iter().any(|told| told.starts_with(stuck)), "{told:#?}");
     assert!(told.iter().all(|told| told.contains("unwiring") || told.contains("destroying")), "{told:#?}");
 }
+
+/// One that takes no part in anything here: it comes up, may be stopped, and goes down.
+const BESIDE: &str = "idle = state {}, starting = state { entry = 'b_base' }, up = state {}, leaving = state { entry = 'b_base.undo' },
+    stopped = state { entry = 'b_calm' }, released = state { entry = 'b_calm.undo' },
+    trans { src = 'initial', tgt = 'idle' }, trans { src = 'idle', tgt = 'starting', events = { 'e_start' } },
+    trans { src = 'starting', tgt = 'up', events = { 'b_base.ok' } },
+    trans { src = 'starting', tgt = 'idle', events = { 'b_base.failed', 'b_base.cancelled' } },
+    trans { src = 'starting', tgt = 'leaving', events = { 'b_base.broken' } },
+    trans { src = 'up', tgt = 'leaving', events = { 'e_shutdown' } },
+    trans { src = 'leaving', tgt = 'idle', events = { 'b_base.undone', 'b_base.undo.failed', 'b_base.undo.broken' } },
+    trans { src = 'up', tgt = 'stopped', events = { 'e_b_stop' } },
+    trans { src = 'stopped', tgt = 'released', events = { 'e_shutdown' } },
+    trans { src = 'released', tgt = 'leaving', events = { 'b_calm.undone', 'b_calm.undo.failed', 'b_calm.undo.broken' } },";
+
+fn refused_beside(configurations: &str, coordinator: &str, of: &str) -> bool {
+    let both = "b_base = Configuration { create('b', 'Drive') },
+                b_calm = Configuration { safe = true, property_set('b.gain', 0.0) },";
+    let small = Small::several(&format!("{configurations} {both}"), &[("a", coordinator), ("b", BESIDE)], "");
+    let report = followed(&small, false);
+    report.findings.iter().any(|f| f.code == davit::model::codes::COORD_REQUEST_REFUSED && f.message.contains(of))
+}
+
+/// A raised event that ends it does not keep the one that begins it from being heard: one comes up again while the other one is led down.
+#[test]
+fn that_one_begins_again_while_the_other_is_led_down_is_followed() {
+    let coordinator = "idle = state {}, clean = state { entry = 'a_off.undo' }, starting = state { entry = 'a_base' }, up = state {},
+        leaving = state { entry = 'a_off' },
+        trans { src = 'initial', tgt = 'idle' }, trans { src = 'idle', tgt = 'clean', events = { 'e_start' } },
+        trans { src = 'clean', tgt = 'starting', events = { 'a_off.undone', 'a_off.undo.failed', 'a_off.undo.broken' } },
+        trans { src = 'starting', tgt = 'up', events = { 'a_base.ok', 'a_base.broken' } },
+        trans { src = 'starting', tgt = 'idle', events = { 'a_base.failed', 'a_base.cancelled' } },
+        trans { src = 'up', tgt = 'leaving', events = { 'e_shutdown' } },
+        trans { src = 'leaving', tgt = 'idle', events = { 'a_off.ok', 'a_off.failed', 'a_off.broken', 'a_off.cancelled' } },";
+    let configurations = "a_base = Configuration { create('a', 'Drive') }, a_off = Configuration { destroy('a') },";
+    assert!(refused_beside(configurations, coordinator, "there is a component `a` already"));
+}
+
+/// A safe configuration that is in force keeps a revert that moves from being carried out, also that of another coordinator.
+#[test]
+fn what_is_not_confirmed_while_another_one_is_stopped_is_followed() {
+    let coordinator = "idle = state {}, starting = state { entry = 'a_base' }, up = state {}, high = state { entry = 'a_up' }, is = state {},
+        lowering = state { entry = 'a_up.undo' }, leaving = state { entry = 'a_base.undo' },
+        trans { src = 'initial', tgt = 'idle' }, trans { src = 'idle', tgt = 'starting', events = { 'e_start' } },
+        trans { src = 'starting', tgt = 'up', events = { 'a_base.ok' } },
+        trans { src = 'starting', tgt = 'idle', events = { 'a_base.failed', 'a_base.cancelled' } },
+        trans { src = 'starting', tgt = 'leaving', events = { 'a_base.broken' } },
+        trans { src = 'up', tgt = 'leaving', events = { 'e_shutdown' } },
+        trans { src = 'leaving', tgt = 'idle', events = { 'a_base.undone', 'a_base.undo.failed', 'a_base.undo.broken' } },
+        trans { src = 'up', tgt = 'high', events = { 'e_high' } },
+        trans { src = 'high', tgt = 'is', events = { 'a_up.ok' } },
+        trans { src = 'high', tgt = 'up', events = { 'a_up.failed', 'a_up.cancelled' } },
+        trans { src = 'high', tgt = 'lowering', events = { 'a_up.broken' } },
+        trans { src = 'is', tgt = 'up', events = { 'a_up.reverted' } },
+        trans { src = 'is', tgt = 'lowering', events = { 'e_shutdown', 'a_up.undo.failed', 'a_up.undo.broken' } },
+        trans { src = 'lowering', tgt = 'leaving', events = { 'a_up.undone', 'a_up.undo.failed', 'a_up.undo.broken' } },";
+    let configurations = "a_base = Configuration { create('a', 'Drive') },
+        a_up = Configuration { on_failure = 'rollback', confirm = { event = 'e_yes', within = 0.5 }, operation_call('a.raise') },";
+    assert!(refused_beside(configurations, coordinator, "a safe configuration is in force"));
+}
