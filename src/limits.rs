@@ -447,3 +447,9 @@ pub const SAMPLES_LINE: usize = 1 << 20;
 /// Evaluations of monitors between two lines of a file of samples. A monitor that runs at 1 kHz has this many in a gap of a
 /// quarter of an hour; more are not made one by one.
 pub const SAMPLES_WAKES: u32 = 1_000_000;
+
+/// Subsystems of one deployment, in each other or beside each other: a fleet, and what a list of them still shows.
+pub const SUBSYSTEMS: usize = 256;
+
+/// Subsystems in each other: a cell with robots with arms with grippers is four.
+pub const SUBSYSTEM_DEPTH: usize = 8;

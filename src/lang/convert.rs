@@ -2,8 +2,9 @@
 
 use super::files::Sources;
 use super::left_out;
-use super::load::{self, Content, LoadOptions};
+use super::load::{self, Content};
 use super::print;
+use super::texts::LoadOptions;
 use crate::diagnostics::{Language, SourceMap};
 use crate::model::{Finding, Findings, codes};
 use std::path::Path;

@@ -7,8 +7,13 @@ use super::lower::{beside, chart, configuration, deployment, monitor};
 use super::lua;
 use super::params::Params;
 use super::scxml;
+use super::texts::{
+    LoadOptions, configuration_tree, coordinator, host_files, loads, monitor_tree, nothing, only_key, open, stem,
+    unique,
+};
 use super::tree::{Cx, Entry, Fields, Kind, Node, Reading};
 use super::trusted::{self, Trust, Trusted};
+use super::whole;
 use super::yaml;
 use crate::diagnostics::{Language, SourceMap};
 use crate::model::{
@@ -18,17 +23,6 @@ use rustc_hash::FxHashMap;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-
-/// How to load.
-#[derive(Debug, Clone, Default)]
-pub struct LoadOptions {
-    /// Parameters (`--set a.b=1` is `("a.b", "1")`): they override `with:`.
-    pub set: Vec<(String, String)>,
-    /// For a coordinator's file alone: it may have functions. In a deployment `trusted:` says so.
-    pub trusted: bool,
-    /// Files that stand in for the host of a trusted coordinator, beside those that a deployment names.
-    pub host: Vec<PathBuf>,
-}
 
 /// What loading a deployment gave.
 #[derive(Debug)]
@@ -95,7 +89,7 @@ pub fn load(path: &Path, options: &LoadOptions) -> Loaded {
 /// The same, from a given set of files.
 pub fn load_from(from: &Sources, path: &Path, options: &LoadOptions) -> Loaded {
     let mut cx = Cx::default();
-    let deployment = load_deployment(&mut cx, from, path, options);
+    let deployment = whole::deployment(&mut cx, from, path, options);
     let (deployment, but_for) = match deployment {
         Some(deployment) if !crate::model::finding::has_errors(&cx.findings) => (Some(deployment), None),
         other => (None, other.filter(|_| !cx.unreadable && concern::only_configurations(&cx.findings))),
@@ -126,10 +120,6 @@ pub fn load_coordinator(from: &Sources, path: &Path, options: &LoadOptions) -> L
     let coordinator = coordinator.filter(|_| !crate::model::finding::has_errors(&cx.findings));
     let (coordinator, program) = coordinator.map_or((None, None), |(chart, program)| (Some(chart), program));
     LoadedCoordinator { coordinator, program, findings: cx.findings, sources: cx.sources, unreadable: cx.unreadable }
-}
-
-fn host_files(paths: &[PathBuf]) -> Vec<(PathBuf, Origin)> {
-    paths.iter().map(|path| (path.clone(), Origin::NONE)).collect()
 }
 
 /// Loads one file of monitors, Lua or YAML.
@@ -238,253 +228,4 @@ fn any(cx: &mut Cx, from: &Sources, path: &Path, params: &mut Params, options: &
 fn made_of_others(cx: &Cx, reading: Reading) -> bool {
     let text = &cx.sources.file(reading.file).text;
     ["ConfiguratorConf", "Configuration", "Monitors"].iter().any(|name| trusted::mentions(text, name))
-}
-
-/// Reads a text into the source map. `named_at` is the place that named the file.
-fn open(cx: &mut Cx, from: &Sources, path: &Path, named_at: Origin) -> Option<(Reading, Language)> {
-    let Some(language) = files::language(path) else {
-        let message = format!("{} is neither Lua, YAML nor SCXML by its name", path.display());
-        let help = "files end in `.lua`, `.yaml` or `.yml`, or `.scxml` for a coordinator";
-        cx.refuse(Finding::error(codes::TEXT_UNKNOWN_LANGUAGE, message).at(named_at).help(help));
-        return None;
-    };
-    match from.read(path) {
-        Ok(text) => {
-            let file = cx.sources.add_file(path.display().to_string(), text, language);
-            let whole = cx.sources.whole_file(file);
-            Some((Reading { file, whole }, language))
-        }
-        Err(finding) => {
-            cx.refuse(finding.at(named_at));
-            None
-        }
-    }
-}
-
-fn stem(path: &Path) -> String {
-    path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default()
-}
-
-/// The map of configurations of a file.
-fn configuration_tree(cx: &mut Cx, from: &Sources, path: &Path, named_at: Origin, params: &mut Params) -> Option<Node> {
-    let (reading, language) = open(cx, from, path, named_at)?;
-    let before = cx.findings.len();
-    match language {
-        Language::Lua => {
-            let made = lua::read(cx, reading, params, &stem(path), None)?;
-            if let Some(configurations) = &made.configurations {
-                concern::by_place(cx, before, configurations);
-            }
-            if made.configurations.is_none() {
-                nothing(cx, reading, "configuration", "`ConfiguratorConf { name = Configuration { … } }`");
-            }
-            made.configurations
-        }
-        Language::Scxml => only_charts(cx, reading, "configurations"),
-        Language::Yaml => {
-            let node = yaml::read(cx, reading)?;
-            let after = cx.findings.len();
-            let configurations = only_key(cx, node, reading, &CONFIGURATIONS_FILE)?;
-            // Of the file as a whole is what was found after it was read.
-            let of_file = cx.findings.split_off(after);
-            concern::by_place(cx, before, &configurations);
-            cx.findings.extend(of_file);
-            Some(configurations)
-        }
-    }
-}
-
-/// The map of monitors of a file.
-fn monitor_tree(cx: &mut Cx, from: &Sources, path: &Path, named_at: Origin, params: &mut Params) -> Option<Node> {
-    let (reading, language) = open(cx, from, path, named_at)?;
-    match language {
-        Language::Lua => {
-            let made = lua::read(cx, reading, params, &stem(path), None)?;
-            if made.monitors.is_none() {
-                nothing(cx, reading, "monitor", "`Monitors { name = monitor { … } }`");
-            }
-            made.monitors
-        }
-        Language::Scxml => only_charts(cx, reading, "monitors"),
-        Language::Yaml => {
-            let node = yaml::read(cx, reading)?;
-            only_key(cx, node, reading, &MONITORS_FILE)
-        }
-    }
-}
-
-/// SCXML has words for charts and for nothing else.
-fn only_charts(cx: &mut Cx, reading: Reading, what: &str) -> Option<Node> {
-    let finding = Finding::error(codes::TEXT_UNKNOWN_LANGUAGE, format!("{what} are not written in SCXML"));
-    cx.refuse(finding.at(reading.whole).help("an SCXML file can be a coordinator"));
-    None
-}
-
-fn nothing(cx: &mut Cx, reading: Reading, what: &str, how: &str) {
-    if !crate::model::finding::has_errors(&cx.findings) {
-        let finding = Finding::error(codes::TEXT_NOTHING, format!("there is no {what} in this file"));
-        cx.report(finding.at(reading.whole).help(format!("write {how}")));
-    }
-}
-
-/// The value of a file's one top-level key.
-fn only_key(cx: &mut Cx, node: Node, reading: Reading, file: &'static Object) -> Option<Node> {
-    let node = match node.kind {
-        Kind::Null => Node::new(Kind::Map(Vec::new()), reading.whole),
-        _ => node,
-    };
-    let mut fields = Fields::of(cx, node, file)?;
-    let value = fields.needed(cx, file.keys[0].name, |_, _| format!("add `{}`", file.example));
-    fields.finish(cx);
-    value
-}
-
-/// Reports configurations of the same name, and keeps the first of each.
-fn unique(cx: &mut Cx, configurations: &mut Vec<Configuration>) {
-    let mut seen: FxHashMap<ConfigId, Origin> = FxHashMap::default();
-    configurations.retain(|c| match seen.get(&c.id) {
-        None => {
-            seen.insert(c.id, c.origin);
-            true
-        }
-        Some(first) => {
-            cx.report(
-                Finding::error(codes::CONF_DUPLICATE, format!("there are two configurations `{}`", c.id))
-                    .at(c.origin)
-                    .labelled("again here")
-                    .also(*first, "first here")
-                    .path(concern::path(c.id.as_str()))
-                    .help("a request names one configuration: give one of them another name"),
-            );
-            false
-        }
-    });
-}
-
-fn loads(from: &Sources, path: &Path) -> lua::Loads {
-    lua::Loads { from: from.clone(), folder: path.parent().map_or_else(PathBuf::new, Path::to_path_buf) }
-}
-
-fn coordinator(
-    cx: &mut Cx,
-    from: &Sources,
-    path: &Path,
-    named_at: Origin,
-    params: &mut Params,
-    trust: Option<&Trust>,
-) -> Option<Trusted> {
-    let (reading, language) = open(cx, from, path, named_at)?;
-    let node = match (language, trust) {
-        (Language::Lua, Some(trust)) => {
-            return trusted::read(cx, from, path, reading, params, trust, &stem(path));
-        }
-        (Language::Lua, None) => {
-            let made = lua::read(cx, reading, params, &stem(path), Some(loads(from, path)))?;
-            if made.chart.is_none() {
-                nothing(cx, reading, "coordinator", "`return state { … }`");
-            }
-            made.chart?
-        }
-        (Language::Scxml, _) => return scxml::read(cx, reading).map(|chart| (chart, None)),
-        (Language::Yaml, _) => {
-            let node = yaml::read(cx, reading)?;
-            only_key(cx, node, reading, &COORDINATOR_FILE)?
-        }
-    };
-    chart::statechart(cx, node).map(|chart| (chart, None))
-}
-
-fn load_deployment(cx: &mut Cx, from: &Sources, path: &Path, options: &LoadOptions) -> Option<Deployment> {
-    let (reading, language) = open(cx, from, path, Origin::NONE)?;
-    if language != Language::Yaml {
-        let finding = Finding::error(codes::TEXT_UNKNOWN_LANGUAGE, "a deployment is written in YAML").at(reading.whole);
-        cx.refuse(finding.help("give the deployment's file (`deployments/NAME.yaml`); this one can be named in it"));
-        return None;
-    }
-    let node = yaml::read(cx, reading)?;
-    let node = match node.kind {
-        Kind::Null => Node::new(Kind::Map(Vec::new()), reading.whole),
-        _ => node,
-    };
-    let origin = match &node.kind {
-        Kind::Map(entries) => entries.first().map_or(reading.whole, |e: &Entry| e.origin),
-        _ => reading.whole,
-    };
-    let draft = deployment::draft(cx, node, &stem(path))?;
-    let mut params = Params::new(cx, draft.with, &options.set);
-    let folder = path.parent().map_or_else(PathBuf::new, Path::to_path_buf);
-    let mut configurations = Vec::new();
-    for (file, named_at) in &draft.configurations {
-        if let Some(node) = configuration_tree(cx, from, &folder.join(file), *named_at, &mut params) {
-            let of_file = configuration::configurations(cx, node);
-            if configurations.is_empty() {
-                configurations = of_file;
-            } else {
-                configurations.extend(of_file);
-            }
-        }
-    }
-    unique(cx, &mut configurations);
-    let (mut charts, mut programs) = (Vec::new(), BTreeMap::new());
-    let trust = draft.trusted.map(|open| {
-        let named = draft.host.iter().map(|(file, origin)| (folder.join(file), *origin));
-        Trust { open, host: named.chain(host_files(&options.host)).collect(), tell_fields: false }
-    });
-    for (name, file, named_at) in &draft.coordinators {
-        if let Some((chart, program)) =
-            coordinator(cx, from, &folder.join(file), *named_at, &mut params, trust.as_ref())
-        {
-            let own = name.or(draft.name);
-            programs.extend(own.zip(program));
-            charts.push((*name, chart, *named_at));
-        }
-    }
-    let is_lua = |cx: &Cx, file: &str| {
-        let name = folder.join(file).display().to_string();
-        cx.sources.files().iter().any(|of| *of.name == *name && of.language == Language::Lua)
-    };
-    if let (Some((_, at)), true, false) = (draft.host.first(), trust.is_some(), charts.is_empty())
-        && !draft.coordinators.iter().any(|(_, file, _)| is_lua(cx, file))
-    {
-        let finding = Finding::error(codes::TEXT_BAD_VALUE, "`host` is given, and no coordinator is in Lua").at(*at);
-        cx.report(finding.help("leave it out: only functions of a coordinator in Lua have a host"));
-    }
-    let mut monitors = Vec::new();
-    for (file, named_at) in &draft.monitors {
-        if let Some(node) = monitor_tree(cx, from, &folder.join(file), *named_at, &mut params) {
-            monitors.extend(monitor::monitors(cx, node));
-        }
-    }
-    monitor::unique(cx, &mut monitors);
-    params.finish(cx);
-    if charts.len() < draft.coordinators.len() {
-        return None;
-    }
-    if charts.is_empty() {
-        return None;
-    }
-    let (coordinators, deploy, shutdown) = beside::join(cx, draft.name?, charts, &draft.deploy?, &draft.shutdown?);
-    Some(Deployment {
-        name: draft.name?,
-        platform: draft.platform?,
-        kind: PlatformKind::of(draft.platform?),
-        platform_options: draft.platform_options,
-        libraries: draft.libraries,
-        types: draft.types,
-        activities: draft.activities,
-        configurations,
-        coordinators,
-        programs,
-        monitors,
-        emits: draft.emits,
-        safety: draft.safety,
-        operator: draft.operator,
-        deploy,
-        shutdown,
-        limits: draft.limits,
-        reactions: draft.reactions,
-        faults: draft.faults,
-        origin,
-        key_origins: draft.key_origins,
-    })
 }

@@ -5,6 +5,7 @@
 //! exist. Whether a component has that port is the business of later rooms, which find the place through the
 //! [`SourceMap`].
 
+mod compose;
 mod concern;
 mod convert;
 mod files;
@@ -19,8 +20,10 @@ pub mod schema;
 mod scxml;
 mod slips;
 mod spelling;
+mod texts;
 mod tree;
 mod trusted;
+mod whole;
 mod words;
 mod yaml;
 
@@ -28,6 +31,7 @@ pub use convert::{Converted, convert};
 pub use files::Sources;
 pub use left_out::warnings as functions_left_out;
 pub use load::{
-    LoadOptions, Loaded, LoadedConfigurations, LoadedCoordinator, LoadedMonitors, load, load_configurations,
-    load_coordinator, load_from, load_monitors,
+    Loaded, LoadedConfigurations, LoadedCoordinator, LoadedMonitors, load, load_configurations, load_coordinator,
+    load_from, load_monitors,
 };
+pub use texts::LoadOptions;

@@ -52,22 +52,13 @@ impl Params {
     }
 
     fn set(&mut self, cx: &mut Cx, path: &str, text: &str) {
-        let bad = |why: &str| {
-            Finding::error(codes::TEXT_BAD_PARAMETER, format!("`--set {path}={text}`: {why}"))
-                .help("write `--set name=value` or `--set table.key=value`; the value is read as YAML")
-        };
+        let bad = |why: &str| bad(path, text, why);
         let parts: Vec<&str> = path.split('.').collect();
         if let Some(error) = parts.iter().find_map(|part| Ident::new(part).err()) {
             cx.refuse(bad(&error.to_string()));
             return;
         }
-        let file = cx.sources.add_file(format!("--set {path}"), text, Language::Yaml);
-        let whole = cx.sources.whole_file(file);
-        let Some(value) = yaml::read(cx, Reading { file, whole }) else { return };
-        if empty(&value).is_some() {
-            cx.refuse(bad("it has no value"));
-            return;
-        }
+        let Some((value, whole)) = value_of(cx, path, text) else { return };
         let at = self.0.iter().position(|p| p.name == parts[0]);
         let index = at.unwrap_or_else(|| {
             let value = Node::new(Kind::Map(Vec::new()), whole);
@@ -105,6 +96,23 @@ impl Params {
             cx.report(finding.at(param.origin).help(help));
         }
     }
+}
+
+fn bad(path: &str, text: &str, why: &str) -> Finding {
+    Finding::error(codes::TEXT_BAD_PARAMETER, format!("`--set {path}={text}`: {why}"))
+        .help("write `--set name=value` or `--set table.key=value`; the value is read as YAML")
+}
+
+/// The value that the command line gives, and where that stands.
+pub fn value_of(cx: &mut Cx, path: &str, text: &str) -> Option<(Node, Origin)> {
+    let file = cx.sources.add_file(format!("--set {path}"), text, Language::Yaml);
+    let whole = cx.sources.whole_file(file);
+    let value = yaml::read(cx, Reading { file, whole })?;
+    if empty(&value).is_some() {
+        cx.refuse(bad(path, text, "it has no value"));
+        return None;
+    }
+    Some((value, whole))
 }
 
 /// Where a value has nothing in it.

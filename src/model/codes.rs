@@ -167,6 +167,52 @@ codes! {
     TYPE_BAD_DEFAULT = "type::bad_default", "a property's default or limits contradict its type",
         "The default of a property must be of its type and lie within `min` and `max`, and `min` may not exceed `max`: \
          a component could otherwise never be created without breaking its own rules. Correct the declaration.";
+    COMPOSE_NOT_EXPORTED = "compose::not_exported", "something of a subsystem is touched that it does not export",
+        "A deployment touches of its subsystems what they export, and nothing else: so a subsystem can be changed inside \
+         without anybody outside noticing. The message says which line to add to `exports` in the subsystem's file, or under \
+         which name it is exported already. Write it as if the subsystem were a component: `connect(\"left.tool_pose\", …)`.";
+    COMPOSE_NOT_OWN = "compose::not_own", "a deployment acts on a component of its subsystem",
+        "What is in a subsystem is made, started, stopped and removed by that subsystem's own configurations. A parent does \
+         not create or destroy it, names it in no list of states, and asks for none of its configurations. Raise an event that the \
+         subsystem accepts instead (`left/e_start`), and wait for what it emits.";
+    COMPOSE_NAME_TAKEN = "compose::name_taken", "a name is that of a subsystem",
+        "What is in a subsystem has its name before its own: `left/Dynamics`. A coordinator cannot have the name of a subsystem, \
+         and no configuration one that begins with it. Give one of them another name.";
+    COMPOSE_PARAMETER = "compose::parameter", "a parameter of a deployment is missing, unknown, or has a value that it does not allow",
+        "Under `parameters` a deployment says what it can be given: by the deployment that it is a subsystem of, or by \
+         `--set NAME=VALUE` (`--set left.NAME=VALUE` for that of a subsystem). One without a default must be given; a value is of the \
+         parameter's type and within its limits.";
+    COMPOSE_UNKNOWN = "compose::unknown", "composition names something that is not there",
+        "An export names a member of a component that no configuration of its file creates, `leaving` or `exports.from` name an event \
+         that is not among those that the deployment emits or accepts, `activities` of a subsystem name an activity that is not there, or \
+         a coordinator raises or waits for an event of a subsystem that this neither accepts nor emits. Correct the name.";
+    COMPOSE_DIFFERS = "compose::differs", "a subsystem does not fit the deployment",
+        "One platform counts for all of a deployment, and a type has one meaning in it: where two files say otherwise, nobody could tell \
+         what runs. Write the same in both.";
+    COMPOSE_CIRCLE = "compose::circle", "a deployment is a part of itself",
+        "A subsystem's file names, directly or by others, the file that names it. Nothing could ever be built of that. Take one of \
+         them out.";
+    COMPOSE_FUNCTIONS = "compose::functions", "the coordinator of a subsystem has functions",
+        "Functions of a trusted coordinator raise and see events by their names in its own file, which are others outside of it. \
+         A subsystem's coordinator is pure; that of the deployment itself may have functions.";
+    COMPOSE_WORD = "compose::word", "an event has a name that is told by itself",
+        "`up`, `down`, `failed` and `stranded` are told to a parent of each of its subsystems without anybody raising them \
+         (`left/up`), and so is what ends in `.ignored`. A deployment cannot emit or accept an event called so. Give it another name.";
+    COMPOSE_SAFETY = "compose::safety", "a safety event does not reach a subsystem with actuators",
+        "A safety event is given at once to every subsystem, to any depth, that declares one of the same name under `safety`. This \
+         one has actuators and none of that name, so it would move on through an emergency. Declare it there, and let it lead to a safe \
+         configuration.";
+    COMPOSE_PROMISE = "compose::promise", "what a subsystem exports is touched while it need not be there",
+        "What a subsystem exports is there from *up* on, or from the event that `exports: { from }` names, until it has left: it says so \
+         (`leaving: { says }`) and waits until its parent lets go (`until`). The parent asks for what touches it only between these, and holds \
+         no frame of it any more when it lets go. The way shows what comes first.";
+    COMPOSE_UNLEFT = "compose::unleft", "a subsystem takes away what it exports without being let go",
+        "A subsystem with `leaving` destroys nothing that it exports before it has heard the event under `until`, so that nothing of its \
+         parent is cut off. Wait for that event before the configurations that take exported components away. One without `leaving` may take \
+         them away whenever it is not *up*.";
+    COMPOSE_EXPORT_DRIVEN = "compose::export_driven", "an exported in-port is driven inside",
+        "An in-port that is exported is one that the parent drives: inside nothing is connected to it, and no configuration writes it. Export \
+         an out-port, or remove the inner connection.";
     DEPLOY_UNKNOWN_STATE = "deploy::unknown_state", "the deployment names a state that the coordinator does not have",
         "`deploy.up`, `deploy.failed` and `shutdown.down` name states of the coordinator, by their own name \
          (`operational`), their full name (`root.operational`) or any end of it that only one state has. Without the \

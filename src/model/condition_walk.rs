@@ -2,7 +2,7 @@
 
 use super::finding::Origin;
 use super::monitor::{Condition, ConditionKind, MonitoredSignal, SignalKind};
-use super::names::ComponentName;
+use super::names::{ComponentName, Ident, MemberRef};
 
 impl Condition {
     /// Calls `f` with it and all that it is made of, outer ones first.
@@ -53,43 +53,64 @@ impl Condition {
 
     /// Calls `f` with every component that it looks at, as often as it stands in it: to put another in its place.
     pub fn for_each_component_mut(&mut self, f: &mut impl FnMut(&mut ComponentName)) {
+        self.for_each_member_mut(&mut |looked| match looked {
+            Looked::Member(member) => f(&mut member.component),
+            Looked::Component(component) => f(component),
+            Looked::Activity(_) => {}
+        });
+    }
+
+    /// Calls `f` with all that it looks at, as often as it stands in it: to put another in its place.
+    pub fn for_each_member_mut(&mut self, f: &mut impl FnMut(Looked<'_>)) {
         use ConditionKind as K;
         match &mut self.kind {
             K::Compare { left, right, .. } => {
-                left.for_each_component_mut(f);
-                right.for_each_component_mut(f);
+                left.for_each_member_mut(f);
+                right.for_each_member_mut(f);
             }
-            K::IsTrue(port) => f(&mut port.member.component),
-            K::InState { component, .. } | K::Faulted(component) => f(component),
-            K::Silent { port, .. } => f(&mut port.component),
-            K::All(list) | K::Any(list) => list.iter_mut().for_each(|c| c.for_each_component_mut(f)),
-            K::No(c) | K::Rise(c) | K::Fall(c) => c.for_each_component_mut(f),
+            K::IsTrue(port) => f(Looked::Member(&mut port.member)),
+            K::InState { component, .. } | K::Faulted(component) => f(Looked::Component(component)),
+            K::Silent { port, .. } => f(Looked::Member(port)),
+            K::All(list) | K::Any(list) => list.iter_mut().for_each(|c| c.for_each_member_mut(f)),
+            K::No(c) | K::Rise(c) | K::Fall(c) => c.for_each_member_mut(f),
             K::Once { condition: c, .. }
             | K::Historically { condition: c, .. }
             | K::ForAtLeast { condition: c, .. }
-            | K::WithinLast { condition: c, .. } => c.for_each_component_mut(f),
+            | K::WithinLast { condition: c, .. } => c.for_each_member_mut(f),
             K::Implies(a, b) | K::Since { hold: a, from: b, .. } => {
-                a.for_each_component_mut(f);
-                b.for_each_component_mut(f);
+                a.for_each_member_mut(f);
+                b.for_each_member_mut(f);
             }
         }
     }
 }
 
+/// What a condition looks at.
+#[derive(Debug)]
+pub enum Looked<'a> {
+    /// A port.
+    Member(&'a mut MemberRef),
+    /// A component.
+    Component(&'a mut ComponentName),
+    /// An activity.
+    Activity(&'a mut Ident),
+}
+
 impl MonitoredSignal {
-    /// Calls `f` with every component that it looks at.
-    fn for_each_component_mut(&mut self, f: &mut impl FnMut(&mut ComponentName)) {
+    /// Calls `f` with all that it looks at.
+    fn for_each_member_mut(&mut self, f: &mut impl FnMut(Looked<'_>)) {
         use SignalKind as K;
         match &mut self.kind {
-            K::Port(port) => f(&mut port.member.component),
-            K::Age(port) | K::Rate { port, .. } => f(&mut port.component),
-            K::Activity { .. } | K::Constant(_) => {}
-            K::Norm(list) | K::Min(list) | K::Max(list) => list.iter_mut().for_each(|s| s.for_each_component_mut(f)),
+            K::Port(port) => f(Looked::Member(&mut port.member)),
+            K::Age(port) | K::Rate { port, .. } => f(Looked::Member(port)),
+            K::Activity { activity, .. } => f(Looked::Activity(activity)),
+            K::Constant(_) => {}
+            K::Norm(list) | K::Min(list) | K::Max(list) => list.iter_mut().for_each(|s| s.for_each_member_mut(f)),
             K::Difference(a, b) => {
-                a.for_each_component_mut(f);
-                b.for_each_component_mut(f);
+                a.for_each_member_mut(f);
+                b.for_each_member_mut(f);
             }
-            K::Abs(s) => s.for_each_component_mut(f),
+            K::Abs(s) => s.for_each_member_mut(f),
         }
     }
 

@@ -9,6 +9,7 @@ use super::names::{ComponentName, ConfigId, EventName, Ident, MemberRef};
 use super::platform_kind::PlatformKind;
 use super::program::Program;
 use super::statechart::{Statechart, is_internal};
+use super::subsystem::{Interface, Subsystem};
 use super::value::Value;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
@@ -57,6 +58,12 @@ pub struct Deployment {
     pub reactions: Vec<SimulatedReaction>,
     /// What goes wrong on the simulated platform.
     pub faults: Vec<StepFault>,
+    /// What it shows to one that it is a subsystem of.
+    pub interface: Interface,
+    /// Its subsystems. What they are made of is among all the above, under names that begin with theirs.
+    pub subsystems: Vec<Subsystem>,
+    /// Without what its subsystems are made of, if it has any.
+    pub own: Option<Arc<Self>>,
     /// Where it was written.
     pub origin: Origin,
     /// Where keys of the file were written, by key path (`deploy.event`, `activities.control.period_ms`), for findings
@@ -80,6 +87,8 @@ pub struct Coordinator {
     pub failed: Vec<String>,
     /// Its state that means *down*.
     pub down: String,
+    /// The path of the subsystem that it is a coordinator of; none: of the deployment itself.
+    pub of: Option<Ident>,
     /// Where it was named.
     pub origin: Origin,
 }

@@ -2,7 +2,7 @@
 
 pub mod codes;
 pub mod component_type;
-mod condition_walk;
+pub mod condition_walk;
 pub mod configuration;
 pub mod deployment;
 pub mod event;
@@ -21,7 +21,9 @@ pub mod snapshot;
 pub mod state_list;
 pub mod statechart;
 pub mod step;
+pub mod subsystem;
 pub mod value;
+pub mod within;
 
 pub use component_type::{
     Catalogue, ComponentType, Direction, Effect, Irreversible, Moves, OperationType, PortType, PropertyType, Tunable,
@@ -45,4 +47,5 @@ pub use snapshot::{ActivityStatus, ComponentSnapshot, Snapshot};
 pub use state_list::{DefaultTwice, StateEntry, StateList, Target};
 pub use statechart::Statechart;
 pub use step::Step;
+pub use subsystem::{Export, ExportKind, Interface, Leaving, Standing, Subsystem};
 pub use value::{Value, ValueType};

@@ -131,6 +131,33 @@ name!(
     "an event is a non-empty text without blanks"
 );
 
+/// What stands in the file of a subsystem under a name has that name there, and the path of the subsystem before it outside.
+macro_rules! scoped {
+    ($($name:ident),*) => {$(
+        impl $name {
+            /// The same as it is called outside of the subsystem of that path, in whose file it stands: `left/Dynamics`.
+            #[must_use]
+            pub fn within(self, path: Ident) -> Self {
+                Self(Ustr::from(&format!("{path}/{self}")))
+            }
+
+            /// As it is called in the file of the subsystem of that path; none where it stands in another one.
+            pub fn local(&self, path: Ident) -> Option<&'static str> {
+                self.as_str().strip_prefix(path.as_str())?.strip_prefix('/')
+            }
+        }
+    )*};
+}
+
+scoped!(Ident, ComponentName, TypeName, ConfigId, EventName);
+
+impl Ident {
+    /// The name without the path of a subsystem.
+    pub fn last(&self) -> &'static str {
+        self.as_str().rsplit_once('/').map_or(self.as_str(), |(_, last)| last)
+    }
+}
+
 impl ComponentName {
     /// The subsystem's path before the last `/`, empty at the top.
     pub fn prefix(&self) -> &'static str {

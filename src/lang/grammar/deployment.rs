@@ -1,5 +1,6 @@
 //! The deployment's file.
 
+use super::composition::{EXPORTS, LEAVING, PARAMETER, SUBSYSTEM};
 use super::{Form, Languages, NameKind, Object, TYPE, key};
 use crate::limits;
 use crate::model::codes::{
@@ -126,6 +127,45 @@ pub static DEPLOYMENT: Object = Object {
             "emits: [e_ready]",
             ("emits: [\"e ready\"]", TEXT_BAD_NAME),
         ),
+        key(
+            "accepts",
+            EVENTS,
+            "Events that it takes of the deployment that it is a subsystem of. Those that begin and end it are among them.",
+            "accepts: [e_grasp]",
+            ("accepts: [\"e grasp\"]", TEXT_BAD_NAME),
+        ),
+        key(
+    "parameters",
+    Form::Named(&Form::Table(&PARAMETER)),
+    "What the deployment can be given, by the deployment that it is a subsystem of or by `--set`; each is a global of its Lua files. \
+     One without a default must be given, and one that no file reads is told.",
+    "parameters: { gain: { type: float, default: 0.5, min: 0.0 } }",
+    ("parameters: { gain: 0.5 }", TEXT_WRONG_TYPE),
+),
+        key(
+    "exports",
+    Form::Table(&EXPORTS),
+    "What of its components a parent may touch, each under a name of its own; the parent writes it as if the subsystem were a \
+     component: `connect(\"left.tool_pose\", \"right.ext_ref\")`.",
+    "exports: { ports: { level: A.x } }",
+    ("exports: [A.x]", TEXT_WRONG_TYPE),
+),
+        key(
+    "leaving",
+    Form::Table(&LEAVING),
+    "How a subsystem is let go before it takes away what it exports.",
+    "leaving: { says: e_leaving, until: e_released }",
+    ("leaving: e_leaving", TEXT_WRONG_TYPE),
+)
+.beside("accepts: [e_released]\nemits: [e_leaving]"),
+        key(
+    "subsystems",
+    Form::Named(&Form::Table(&SUBSYSTEM)),
+    "Other deployments as parts of this one, each under a name; one file may be used many times. Names of what is in one have its \
+     name before them: `left/Dynamics`, `left/e_start`.",
+    "subsystems: { left: { deployment: robot.yaml } }",
+    ("subsystems: [robot.yaml]", TEXT_WRONG_TYPE),
+),
         key(
             "safety",
             EVENTS,

@@ -6,6 +6,7 @@
 //! value goes. A key that is read and has no row, or the reverse, is found in the first file that has such a table.
 
 mod chart;
+mod composition;
 mod configuration;
 mod deployment;
 mod monitor;
@@ -13,6 +14,7 @@ mod own_words;
 mod types;
 
 pub use chart::{CONNECTOR, COORDINATOR_FILE, STATE, TRANSITION};
+pub use composition::{EXPORTS, LEAVING, PARAMETER, SUBSYSTEM};
 pub use configuration::{BUFFER, CHANGES, CONFIGURATION, CONFIGURATIONS_FILE, CONFIRM, Primitive, UNDO, primitive};
 pub use deployment::{ACTIVITY, DEPLOY, DEPLOYMENT, FAULT, LIMITS, REACTION, SHUTDOWN, SIMULATED, TRUSTED};
 pub use monitor::{COMPARISON, MONITOR, MONITORS_FILE};

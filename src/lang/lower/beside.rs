@@ -3,8 +3,7 @@
 //! A state is written `STATE`, or `COORDINATOR:STATE` where there are several coordinators. A state without a coordinator's
 //! name is meant of every coordinator that is not named with one of its own.
 
-use super::deployment::names;
-use super::{name, text};
+use super::{name, names, text};
 use crate::lang::grammar::{DEPLOY, SHUTDOWN};
 use crate::lang::tree::{Cx, Fields, Kind, Node};
 use crate::model::finding::did_you_mean;
@@ -170,7 +169,7 @@ pub fn join(
     let coordinators = charts.into_iter().zip(names).zip(up.into_iter().zip(down));
     let coordinators = coordinators.map(|(((named, chart, origin), name), (up, down))| {
         let written = if named.is_some() { CoordinatorNaming::Named } else { CoordinatorNaming::Alone };
-        Coordinator { name, written, chart, up, failed: failed(name), down, origin }
+        Coordinator { name, written, chart, up, failed: failed(name), down, of: None, origin }
     });
     let deploy = BringUp { event: rise.event, within: rise.within };
     let shutdown = TakeDown { event: fall.event, within: fall.within, rest: fall.rest.clone() };

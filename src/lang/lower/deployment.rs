@@ -1,17 +1,16 @@
 //! Deployment files: what their keys mean. The files they name are read by the caller.
 
 use super::beside::{self, Fall, Rise};
-use super::{name, simulated, text, types, value};
+use super::interface::{self, SubsystemDraft};
+use super::{name, names, once, simulated, text, types, value};
 use crate::lang::grammar::{ACTIVITY, DEPLOYMENT, LIMITS, TRUSTED};
 use crate::lang::tree::{Cx, Entry, Fields, Kind, Node};
 use crate::model::finding::did_you_mean;
-use crate::model::names::NameError;
 use crate::model::{
-    Activity, ComponentType, ConfigId, DeploymentLimits, EventName, Finding, Ident, MemberRef, Openings, OperatorMay,
-    Origin, SimulatedReaction, StepFault, Value, codes,
+    Activity, ComponentType, ConfigId, DeploymentLimits, EventName, Finding, Ident, Interface, MemberRef, Openings,
+    OperatorMay, Origin, SimulatedReaction, StepFault, Value, codes,
 };
 use std::collections::BTreeMap;
-use std::str::FromStr;
 
 /// A deployment file, before the files that it names are read.
 pub struct Draft {
@@ -45,6 +44,10 @@ pub struct Draft {
     pub safety: Vec<(EventName, Origin)>,
     /// `operator`
     pub operator: Vec<(OperatorMay, Origin)>,
+    /// `parameters`, `exports`, `accepts`, `leaving`
+    pub interface: Interface,
+    /// `subsystems`
+    pub subsystems: Vec<SubsystemDraft>,
     /// `deploy`
     pub deploy: Option<Rise>,
     /// `shutdown`
@@ -145,6 +148,8 @@ pub fn draft(cx: &mut Cx, node: Node, file_name: &str) -> Option<Draft> {
     let emits = emits(cx, &mut fields);
     let safety = names(cx, &mut fields, "safety", "`safety`");
     let operator = operator(cx, &mut fields);
+    let interface = interface::interface(cx, &mut fields);
+    let subsystems = interface::subsystems(cx, &mut fields);
     let deploy = fields.take(cx, "deploy").and_then(|node| beside::rise(cx, node));
     let shutdown = fields.take(cx, "shutdown").and_then(|node| beside::fall(cx, node));
     let limits = fields.take(cx, "limits").map(|node| limits(cx, node)).unwrap_or_default();
@@ -171,6 +176,8 @@ pub fn draft(cx: &mut Cx, node: Node, file_name: &str) -> Option<Draft> {
         emits,
         safety,
         operator,
+        interface,
+        subsystems,
         deploy,
         shutdown,
         limits,
@@ -257,29 +264,6 @@ fn emits(cx: &mut Cx, fields: &mut Fields) -> Vec<(EventName, Origin)> {
     let nodes = fields.several(cx, "emits");
     let example = fields.row("emits").example;
     nodes.iter().filter_map(|node| Some((name(cx, node, "an emitted event", example)?, node.origin))).collect()
-}
-
-/// A list of names, each of them once; `path` is the key's, for messages.
-pub(super) fn names<T>(cx: &mut Cx, fields: &mut Fields, key: &'static str, path: &str) -> Vec<(T, Origin)>
-where
-    T: FromStr<Err = NameError> + PartialEq + std::fmt::Display,
-{
-    let mut out: Vec<(T, Origin)> = Vec::new();
-    for node in fields.several(cx, key) {
-        let Some(name) = name::<T>(cx, &node, path, fields.row(key).example) else { continue };
-        once(cx, &mut out, name, node.origin, path);
-    }
-    out
-}
-
-fn once<T: PartialEq + std::fmt::Display>(cx: &mut Cx, out: &mut Vec<(T, Origin)>, name: T, origin: Origin, key: &str) {
-    match out.iter().find(|(other, _)| *other == name) {
-        None => out.push((name, origin)),
-        Some((_, first)) => {
-            let finding = Finding::error(codes::TEXT_DUPLICATE_KEY, format!("`{name}` stands twice in {key}"));
-            cx.report(finding.at(origin).also(*first, "first here").help("name each once"));
-        }
-    }
 }
 
 /// `operator`: configurations, and properties and in-ports as `Component.member`.

@@ -6,14 +6,15 @@ pub mod condition;
 pub mod configuration;
 pub mod deployment;
 mod fields;
+pub mod interface;
 pub mod monitor;
 mod simulated;
 pub mod types;
 
-use super::tree::{Cx, Kind, Node};
+use super::tree::{Cx, Fields, Kind, Node};
 use crate::model::finding::did_you_mean;
 use crate::model::names::NameError;
-use crate::model::{Finding, Ident, Value, codes};
+use crate::model::{Finding, Ident, Origin, Value, codes};
 use std::str::FromStr;
 use std::sync::Arc;
 use std::time::Duration;
@@ -43,6 +44,29 @@ fn bad_name(cx: &mut Cx, node: &Node, error: &NameError, example: &str) {
             .labelled(error.reason)
             .help(format!("write it like `{example}`")),
     );
+}
+
+/// A list of names, each of them once; `path` is the key's, for messages.
+fn names<T>(cx: &mut Cx, fields: &mut Fields, key: &'static str, path: &str) -> Vec<(T, Origin)>
+where
+    T: FromStr<Err = NameError> + PartialEq + std::fmt::Display,
+{
+    let mut out: Vec<(T, Origin)> = Vec::new();
+    for node in fields.several(cx, key) {
+        let Some(name) = name::<T>(cx, &node, path, fields.row(key).example) else { continue };
+        once(cx, &mut out, name, node.origin, path);
+    }
+    out
+}
+
+fn once<T: PartialEq + std::fmt::Display>(cx: &mut Cx, out: &mut Vec<(T, Origin)>, name: T, origin: Origin, key: &str) {
+    match out.iter().find(|(other, _)| *other == name) {
+        None => out.push((name, origin)),
+        Some((_, first)) => {
+            let finding = Finding::error(codes::TEXT_DUPLICATE_KEY, format!("`{name}` stands twice in {key}"));
+            cx.report(finding.at(origin).also(*first, "first here").help("name each once"));
+        }
+    }
 }
 
 /// A text.

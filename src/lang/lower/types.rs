@@ -106,44 +106,43 @@ fn property(cx: &mut Cx, entry: Entry) -> Option<PropertyType> {
     let mut fields = Fields::of(cx, entry.value, &PROPERTY)?;
     let ty = fields.take(cx, "type").and_then(|node| value_type(cx, node));
     let default = fields.take(cx, "default");
-    let default_origin = default.as_ref().map(|node| node.origin);
-    let default = default.and_then(|node| value(cx, node, "`default`"));
     let (min, max) = (fields.number(cx, "min"), fields.number(cx, "max"));
     let when = [("unconfigured", Tunable::Unconfigured), ("stopped", Tunable::Stopped), ("always", Tunable::Always)];
-    let tunable = fields.choice(cx, "tunable", &when);
+    let tunable = fields.choice(cx, "tunable", &when).unwrap_or_default();
     let unit = unit(cx, &mut fields);
     let doc = doc(cx, &mut fields);
     fields.finish(cx);
-    let mut property = PropertyType {
-        ty: ty?,
-        default: None,
-        min,
-        max,
-        tunable: tunable.unwrap_or_default(),
-        unit,
-        doc,
-        origin: entry.origin,
-    };
+    let property = PropertyType { ty: ty?, default: None, min, max, tunable, unit, doc, origin: entry.origin };
+    Some(fitting(cx, property, default, "a property"))
+}
+
+/// A property, or what is like one, with its default, if both are in order.
+pub(super) fn fitting(cx: &mut Cx, mut property: PropertyType, default: Option<Node>, what: &str) -> PropertyType {
+    let default_origin = default.as_ref().map_or(property.origin, |node| node.origin);
+    let default = default.and_then(|node| value(cx, node, "`default`"));
+    let origin = property.origin;
     if property.ty == ValueType::Event {
-        let finding = Finding::error(codes::TYPE_BAD_TYPE, "a property cannot be of type `event`");
-        cx.report(finding.at(entry.origin).help("only ports carry events"));
+        let finding = Finding::error(codes::TYPE_BAD_TYPE, format!("{what} cannot be of type `event`"));
+        cx.report(finding.at(origin).help("only ports carry events"));
     }
-    if let (Some(min), Some(max)) = (min, max)
+    if let (Some(min), Some(max)) = (property.min, property.max)
         && min > max
     {
         let finding = Finding::error(codes::TYPE_BAD_DEFAULT, format!("`min` ({min}) is larger than `max` ({max})"));
-        cx.report(finding.at(entry.origin).help("no value would be allowed: exchange them"));
+        cx.report(finding.at(origin).help("no value would be allowed: exchange them"));
     } else if let Some(default) = default {
         match property.fit(default) {
             Ok(default) => property.default = Some(default),
             Err(error) => {
                 let finding = Finding::error(codes::TYPE_BAD_DEFAULT, format!("the default is not allowed: {error}"));
-                let origin = default_origin.unwrap_or(entry.origin);
-                cx.report(finding.at(origin).help("a default is of the property's type and within its limits"));
+                cx.report(finding.at(default_origin).help(format!(
+                    "a default is of the {}'s type and within its limits",
+                    what.trim_start_matches("a ")
+                )));
             }
         }
     }
-    Some(property)
+    property
 }
 
 fn operation(cx: &mut Cx, entry: Entry) -> Option<OperationType> {
@@ -190,7 +189,7 @@ fn effect(cx: &mut Cx, node: Node) -> Option<Effect> {
 }
 
 /// A type: a text (`float`, `"float[3]"`), or a record as a map (`{x: float, y: float}`).
-fn value_type(cx: &mut Cx, node: Node) -> Option<ValueType> {
+pub(super) fn value_type(cx: &mut Cx, node: Node) -> Option<ValueType> {
     match node.kind {
         Kind::Str(text) => match text.parse() {
             Ok(ty) => Some(ty),

@@ -1,0 +1,275 @@
+//! A deployment with its subsystems: what it touches of them is resolved to what they export, and all are put together.
+
+use super::tree::Cx;
+use crate::model::condition_walk::Looked;
+use crate::model::finding::did_you_mean;
+use crate::model::monitor::Condition;
+use crate::model::subsystem::ExportKind;
+use crate::model::within::Within;
+use crate::model::{
+    ChangeKind, ComponentName, Configuration, Deployment, Finding, Ident, MemberRef, OperatorMay, Origin, Subsystem,
+    Target, codes,
+};
+use std::sync::Arc;
+
+/// Puts a deployment together with its subsystems: the result has all that they are made of, by their paths.
+pub fn compose(cx: &mut Cx, mut own: Deployment) -> Deployment {
+    if own.subsystems.is_empty() {
+        return own;
+    }
+    let subsystems = own.subsystems.clone();
+    let resolve = Resolve { subsystems: &subsystems };
+    resolve.names(cx, &own);
+    for (name, export) in &mut own.interface.exports {
+        export.of = resolve.member(cx, export.of, export.kind, export.origin, name.as_str());
+    }
+    let mut configurations = std::mem::take(&mut own.configurations);
+    configurations.iter_mut().for_each(|configuration| resolve.configuration(cx, configuration));
+    own.configurations = configurations;
+    let mut monitors = std::mem::take(&mut own.monitors);
+    monitors.iter_mut().for_each(|monitor| {
+        let origin = monitor.origin;
+        resolve.condition(cx, &mut monitor.when, origin);
+    });
+    own.monitors = monitors;
+    for (may, origin) in &mut own.operator {
+        if let OperatorMay::Set(member) = may {
+            let kind = resolve.kind_of(*member);
+            *member = resolve.member(cx, *member, kind, *origin, "operator");
+        }
+    }
+    let mut whole = own.clone();
+    for subsystem in &subsystems {
+        resolve.fits(cx, &own, subsystem);
+        join(cx, &mut whole, subsystem);
+    }
+    whole.own = Some(Arc::new(own));
+    whole
+}
+
+/// Takes in what a subsystem is made of.
+fn join(cx: &mut Cx, whole: &mut Deployment, subsystem: &Subsystem) {
+    let own = &*subsystem.own;
+    let within = Within { path: subsystem.name, activities: &subsystem.activities };
+    for library in &own.libraries {
+        if !whole.libraries.contains(library) {
+            whole.libraries.push(*library);
+        }
+    }
+    for ty in &own.types {
+        match whole.types.iter().find(|known| known.name == ty.name) {
+            None => whole.types.push(ty.clone()),
+            Some(known) if known == ty => {}
+            Some(known) => {
+                let message = format!("two files declare a type `{}`, and not the same", ty.name);
+                let finding = Finding::error(codes::COMPOSE_DIFFERS, message).at(ty.origin);
+                cx.report(finding.also(known.origin, "the other one").help("give one of them another name"));
+            }
+        }
+    }
+    let activities = own.activities.iter().filter(|(name, _)| !subsystem.activities.contains_key(*name));
+    whole.activities.extend(activities.map(|(name, activity)| (within.activity(*name), *activity)));
+    whole.configurations.extend(own.configurations.iter().map(|of| within.configuration(of)));
+    for coordinator in &own.coordinators {
+        if let Some(program) = own.programs.get(&coordinator.name) {
+            whole.programs.insert(within.coordinator_name(coordinator), program.clone());
+        }
+        whole.coordinators.push(within.coordinator(coordinator));
+    }
+    whole.monitors.extend(own.monitors.iter().map(|monitor| within.monitor(monitor)));
+    // What is told between the files leaves neither of them unheard.
+    let told = own.emits.iter().chain(&own.interface.accepts).map(|(event, origin)| (within.event(*event), *origin));
+    let asked = [own.deploy.event, own.shutdown.event].map(|event| (within.event(event), subsystem.origin));
+    for (event, origin) in told.chain(asked) {
+        if !whole.emits.iter().any(|(known, _)| *known == event) {
+            whole.emits.push((event, origin));
+        }
+    }
+    whole.safety.extend(own.safety.iter().map(|(event, origin)| (within.event(*event), *origin)));
+    whole.operator.extend(own.operator.iter().map(|(may, origin)| (within.operator(*may), *origin)));
+    whole.reactions.extend(own.reactions.iter().map(|reaction| within.reaction(reaction)));
+    whole.faults.extend(own.faults.iter().map(|fault| within.fault(fault)));
+}
+
+/// Finds what is meant by names of what is in subsystems.
+struct Resolve<'a> {
+    subsystems: &'a [Subsystem],
+}
+
+impl Resolve<'_> {
+    fn named(&self, name: &str) -> Option<&Subsystem> {
+        self.subsystems.iter().find(|subsystem| subsystem.name.as_str() == name)
+    }
+
+    /// The subsystem that a component is in, by its name from here, or whose name it is.
+    fn holding(&self, component: ComponentName) -> Option<&Subsystem> {
+        let text = component.as_str();
+        self.named(text.split_once('/').map_or(text, |(first, _)| first))
+    }
+
+    /// Whether a subsystem's platform and activities are those of the deployment, and it has no coordinators with functions.
+    fn fits(&self, cx: &mut Cx, own: &Deployment, subsystem: &Subsystem) {
+        let name = subsystem.name;
+        if (subsystem.own.platform, &subsystem.own.platform_options) != (own.platform, &own.platform_options) {
+            let message = format!("`{name}` is written for another platform than `{}`", own.platform);
+            let finding = Finding::error(codes::COMPOSE_DIFFERS, message).at(subsystem.origin);
+            let help = "one platform counts for all of a deployment: write the same in both files";
+            cx.report(finding.also(subsystem.own.key_origin("platform"), "its platform").help(help));
+        }
+        for (inner, outer) in &subsystem.activities {
+            for (activity, of, whose) in [(inner, &*subsystem.own, "its file"), (outer, own, "this file")] {
+                if !of.activities.contains_key(activity) {
+                    let message = format!("there is no activity `{activity}` in {whose}");
+                    let known = of.activities.keys().map(Ident::as_str);
+                    let help = did_you_mean(activity.as_str(), "activities", known);
+                    let finding = Finding::error(codes::COMPOSE_UNKNOWN, message).at(subsystem.origin);
+                    cx.report(finding.help(help));
+                }
+            }
+        }
+        if let Some(coordinator) = subsystem.own.programs.keys().next() {
+            let message = format!("the coordinator `{coordinator}` of `{name}` has functions");
+            let finding = Finding::error(codes::COMPOSE_FUNCTIONS, message).at(subsystem.origin);
+            cx.report(finding.help(
+                "a subsystem's coordinator raises events and has no functions; those of the deployment itself may",
+            ));
+        }
+    }
+
+    /// Whether the names of this file's own things are its own.
+    fn names(&self, cx: &mut Cx, own: &Deployment) {
+        for coordinator in &own.coordinators {
+            if let Some(subsystem) = self.named(coordinator.name.as_str()) {
+                let message = format!("a coordinator and a subsystem are both called `{}`", subsystem.name);
+                let finding = Finding::error(codes::COMPOSE_NAME_TAKEN, message).at(subsystem.origin);
+                cx.report(finding.also(coordinator.origin, "the coordinator").help("give one of them another name"));
+            }
+        }
+        for configuration in &own.configurations {
+            let first = configuration.id.as_str().split('/').next().unwrap_or_default();
+            if let Some(subsystem) = self.named(first) {
+                let message = format!("`{}` is called like what is in the subsystem `{first}`", configuration.id);
+                let finding = Finding::error(codes::COMPOSE_NAME_TAKEN, message).at(configuration.origin);
+                let path = super::concern::path(configuration.id.as_str());
+                cx.report(finding.path(path).also(subsystem.origin, "the subsystem").help("give it another name"));
+            }
+        }
+    }
+
+    fn configuration(&self, cx: &mut Cx, of: &mut Configuration) {
+        let before = cx.findings.len();
+        for change in &mut of.changes {
+            let at = change.origin;
+            match &mut change.kind {
+                ChangeKind::Create { component, .. }
+                | ChangeKind::Destroy { component }
+                | ChangeKind::Replace { component, .. } => self.not_own(cx, *component, at),
+                ChangeKind::Connect { from, to, .. } | ChangeKind::Disconnect { from, to } => {
+                    *from = self.member(cx, *from, ExportKind::Port, at, "");
+                    *to = self.member(cx, *to, ExportKind::Port, at, "");
+                }
+                ChangeKind::PropertySet { property, .. } => {
+                    *property = self.member(cx, *property, ExportKind::Property, at, "");
+                }
+                ChangeKind::PortWrite { port, .. } => *port = self.member(cx, *port, ExportKind::Port, at, ""),
+                ChangeKind::OperationCall { call, undo } => {
+                    for call in std::iter::once(call).chain(undo) {
+                        call.operation = self.member(cx, call.operation, ExportKind::Operation, at, "");
+                    }
+                }
+            }
+        }
+        for entry in of.pre.iter().chain(of.post.iter()) {
+            if let Target::Component(component) = entry.target {
+                self.not_own(cx, component, entry.origin);
+            }
+        }
+        if let Some(holds) = &mut of.holds {
+            self.condition(cx, holds, of.origin);
+        }
+        super::concern::all(cx, before, of.id.as_str());
+    }
+
+    fn condition(&self, cx: &mut Cx, of: &mut Condition, origin: Origin) {
+        let at = if of.origin == Origin::NONE { origin } else { of.origin };
+        of.for_each_member_mut(&mut |looked| match looked {
+            Looked::Member(member) => *member = self.member(cx, *member, ExportKind::Port, at, ""),
+            Looked::Component(component) => self.not_own(cx, *component, at),
+            Looked::Activity(_) => {}
+        });
+    }
+
+    /// What a member is that is exported; of what is not, what it is is no matter.
+    fn kind_of(&self, member: MemberRef) -> ExportKind {
+        let export = self.named(member.component.as_str()).and_then(|of| of.own.interface.exports.get(&member.member));
+        export.map_or(ExportKind::Property, |export| export.kind)
+    }
+
+    /// What a member is that is written so: of a subsystem what it exports under that name.
+    fn member(&self, cx: &mut Cx, member: MemberRef, kind: ExportKind, at: Origin, place: &str) -> MemberRef {
+        let Some(subsystem) = self.holding(member.component) else { return member };
+        let exports = &subsystem.own.interface.exports;
+        if member.component.as_str() != subsystem.name.as_str() {
+            let inner = member.component.local(subsystem.name).unwrap_or_default();
+            let inner = format!("{inner}.{}", member.member);
+            let alias = exports.iter().find(|(_, export)| export.of.to_string() == inner);
+            let help = match alias {
+                Some((alias, _)) => format!("write `{}.{alias}`", subsystem.name),
+                None => format!(
+                    "export it in its file (`exports: {{ {}: {{ {}: {inner} }} }}`), and write `{}.{}`",
+                    kind.key(),
+                    member.member,
+                    subsystem.name,
+                    member.member
+                ),
+            };
+            let message = format!(
+                "`{member}` is in `{}`: what a subsystem exports is touched from outside, and nothing else",
+                subsystem.name
+            );
+            let finding = Finding::error(codes::COMPOSE_NOT_EXPORTED, message).at(at).path(place);
+            cx.report(finding.help(help));
+            return member;
+        }
+        match exports.get(&member.member) {
+            Some(export) if export.kind == kind => {
+                MemberRef { component: export.of.component.within(subsystem.name), member: export.of.member }
+            }
+            Some(export) => {
+                let message =
+                    format!("`{member}` is exported under `{}`, and not under `{}`", export.kind.key(), kind.key());
+                let finding = Finding::error(codes::COMPOSE_NOT_EXPORTED, message).at(at).path(place);
+                cx.report(
+                    finding
+                        .also(export.origin, "exported here")
+                        .help("ports are connected and written, properties set, operations called"),
+                );
+                member
+            }
+            None => {
+                let message = format!("`{}` exports nothing called `{}`", subsystem.name, member.member);
+                let known = exports.iter().filter(|(_, export)| export.kind == kind).map(|(name, _)| name.as_str());
+                let help = did_you_mean(member.member.as_str(), kind.key(), known);
+                let finding = Finding::error(codes::COMPOSE_NOT_EXPORTED, message).at(at).path(place);
+                cx.report(finding.also(subsystem.origin, "the subsystem").help(help));
+                member
+            }
+        }
+    }
+
+    /// A component that only its own file makes, takes away, and brings from one run state to another.
+    fn not_own(&self, cx: &mut Cx, component: ComponentName, at: Origin) {
+        if let Some(subsystem) = self.holding(component) {
+            let name = subsystem.name;
+            let message = match component.as_str() == name.as_str() {
+                true => format!("`{name}` is a subsystem, and no component"),
+                false => format!("`{component}` is a component of the subsystem `{name}`"),
+            };
+            let finding = Finding::error(codes::COMPOSE_NOT_OWN, message).at(at);
+            cx.report(finding.also(subsystem.origin, "the subsystem").help(format!(
+                "its own file makes, starts, stops and removes what is in it: raise an event that it accepts (`{name}/{}`)",
+                subsystem.own.deploy.event
+            )));
+        }
+    }
+}

@@ -1,0 +1,201 @@
+//! What makes a deployment a part of another one: its parameters, what it shows, its subsystems.
+
+use super::types::{fitting, value_type};
+use super::{name, text, value};
+use crate::lang::grammar::{EXPORTS, LEAVING, PARAMETER, SUBSYSTEM};
+use crate::lang::tree::{Cx, Entry, Fields, Kind, Node};
+use crate::model::subsystem::ExportKind;
+use crate::model::{
+    EventName, Export, Finding, Ident, Interface, Leaving, MemberRef, Origin, PropertyType, Tunable, codes,
+};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// A subsystem, before its file is read.
+pub struct SubsystemDraft {
+    /// Its name.
+    pub name: Ident,
+    /// Its file.
+    pub file: String,
+    /// Where that is named.
+    pub named_at: Origin,
+    /// What it is given.
+    pub parameters: Vec<Entry>,
+    /// Its activities that are those of this file.
+    pub activities: Vec<(Ident, Ident, Origin)>,
+    /// Where it is named.
+    pub origin: Origin,
+}
+
+/// `parameters`, `exports`, `accepts` and `leaving`.
+pub fn interface(cx: &mut Cx, fields: &mut Fields) -> Interface {
+    let mut interface = Interface { accepts: super::names(cx, fields, "accepts", "`accepts`"), ..Interface::default() };
+    let example = fields.row("parameters").example;
+    if let Some(node) = fields.take(cx, "parameters") {
+        for (name, entry) in named(cx, node, "`parameters`", example) {
+            interface.parameters.extend(parameter(cx, entry).map(|parameter| (name, parameter)));
+        }
+    }
+    if let Some(node) = fields.take(cx, "exports") {
+        exports(cx, node, &mut interface);
+    }
+    interface.leaving = fields.take(cx, "leaving").and_then(|node| leaving(cx, node));
+    interface
+}
+
+/// A table of things by plain names.
+fn named(cx: &mut Cx, node: Node, what: &str, example: &str) -> Vec<(Ident, Entry)> {
+    let Kind::Map(entries) = node.kind else {
+        cx.wrong(&node, what, "a table of named values", example);
+        return Vec::new();
+    };
+    let mut out = Vec::new();
+    for entry in entries {
+        let key = Node::new(Kind::Str(entry.key.to_string().into()), entry.origin);
+        out.extend(name::<Ident>(cx, &key, what, example).map(|name| (name, entry)));
+    }
+    out
+}
+
+fn parameter(cx: &mut Cx, entry: Entry) -> Option<PropertyType> {
+    let mut fields = Fields::of(cx, entry.value, &PARAMETER)?;
+    let ty = fields.take(cx, "type").and_then(|node| value_type(cx, node));
+    let default = fields.take(cx, "default");
+    let (min, max) = (fields.number(cx, "min"), fields.number(cx, "max"));
+    let unit = fields.text(cx, "unit").map(Arc::from);
+    let doc = fields.text(cx, "doc").unwrap_or_default();
+    fields.finish(cx);
+    let (ty, origin) = (ty?, entry.origin);
+    let given = PropertyType { ty, default: None, min, max, tunable: Tunable::default(), unit, doc, origin };
+    Some(fitting(cx, given, default, "a parameter"))
+}
+
+fn exports(cx: &mut Cx, node: Node, interface: &mut Interface) {
+    let Some(mut fields) = Fields::of(cx, node, &EXPORTS) else { return };
+    for (key, kind) in ExportKind::KEYS {
+        let example = fields.row(key).example;
+        let Some(node) = fields.take(cx, key) else { continue };
+        for (name, entry) in named(cx, node, &format!("`exports.{key}`"), example) {
+            let Some(of) = super::name::<MemberRef>(cx, &entry.value, "an export", "Arm_Kinematics.tool_pose") else {
+                continue;
+            };
+            if let Some(first) = interface.exports.get(&name) {
+                let message = format!("`{name}` is exported twice");
+                let finding = Finding::error(codes::TEXT_DUPLICATE_KEY, message).at(entry.origin);
+                cx.report(finding.also(first.origin, "first here").help("give one of them another name"));
+                continue;
+            }
+            interface.exports.insert(name, Export { kind, of, origin: entry.origin });
+        }
+    }
+    let place = fields.place("from");
+    let from: Option<EventName> = fields.name(cx, "from");
+    interface.from = from.zip(place);
+    fields.finish(cx);
+}
+
+fn leaving(cx: &mut Cx, node: Node) -> Option<Leaving> {
+    let origin = node.origin;
+    let mut fields = Fields::of(cx, node, &LEAVING)?;
+    let (says, until) = (fields.name(cx, "says"), fields.name(cx, "until"));
+    fields.finish(cx);
+    Some(Leaving { says: says?, until: until?, origin })
+}
+
+/// `subsystems`
+pub fn subsystems(cx: &mut Cx, fields: &mut Fields) -> Vec<SubsystemDraft> {
+    let example = fields.row("subsystems").example;
+    let Some(node) = fields.take(cx, "subsystems") else { return Vec::new() };
+    let entries = named(cx, node, "`subsystems`", example);
+    entries.into_iter().filter_map(|(name, entry)| subsystem(cx, name, entry)).collect()
+}
+
+fn subsystem(cx: &mut Cx, own: Ident, entry: Entry) -> Option<SubsystemDraft> {
+    let mut fields = Fields::of(cx, entry.value, &SUBSYSTEM)?;
+    let file = fields.take(cx, "deployment");
+    let named_at = file.as_ref().map_or(entry.origin, |node| node.origin);
+    let file = file.and_then(|node| text(cx, &node, "`deployment`", fields.row("deployment").example));
+    let parameters = match fields.take(cx, "parameters") {
+        None => Vec::new(),
+        Some(Node { kind: Kind::Map(entries), .. }) => entries,
+        Some(node) => {
+            cx.wrong(&node, "`parameters`", "a table of named values", fields.row("parameters").example);
+            Vec::new()
+        }
+    };
+    let mut activities = Vec::new();
+    let example = fields.row("activities").example;
+    if let Some(node) = fields.take(cx, "activities") {
+        for (inner, entry) in named(cx, node, "`activities`", example) {
+            let outer = name::<Ident>(cx, &entry.value, "an activity", example);
+            activities.extend(outer.map(|outer| (inner, outer, entry.origin)));
+        }
+    }
+    fields.finish(cx);
+    Some(SubsystemDraft { name: own, file: file?, named_at, parameters, activities, origin: entry.origin })
+}
+
+/// Values of parameters as the Lua files read them: those that are given, and the defaults of the others. `of`: who gives them, for
+/// messages.
+pub fn given(
+    cx: &mut Cx,
+    declared: &BTreeMap<Ident, PropertyType>,
+    mut given: Vec<Entry>,
+    of: &str,
+    at: Origin,
+) -> Vec<Entry> {
+    let mut values = Vec::new();
+    for (name, parameter) in declared {
+        let node = given.iter().position(|entry| entry.key == name.as_str()).map(|place| given.remove(place));
+        let Some(entry) = node else {
+            if let Some(default) = &parameter.default {
+                let value = node_of(default, parameter.origin);
+                values.push(Entry { key: name.to_string().into(), origin: parameter.origin, value });
+            } else {
+                let message = format!("{of} does not give the parameter `{name}`, which has no default");
+                let finding = Finding::error(codes::COMPOSE_PARAMETER, message).at(at);
+                cx.report(
+                    finding
+                        .also(parameter.origin, "declared here")
+                        .help(format!("give it ({}), or write a `default` where it is declared", parameter.ty)),
+                );
+            }
+            continue;
+        };
+        let (origin, place) = (entry.origin, entry.value.origin);
+        let Some(is) = value(cx, entry.value, "a parameter") else { continue };
+        match parameter.fit(is) {
+            Ok(is) => values.push(Entry { key: name.to_string().into(), origin, value: node_of(&is, place) }),
+            Err(error) => {
+                let finding = Finding::error(codes::COMPOSE_PARAMETER, format!("the parameter `{name}`: {error}"));
+                cx.report(
+                    finding.at(place).also(parameter.origin, "declared here").help("give a value that it allows"),
+                );
+            }
+        }
+    }
+    for entry in given {
+        let known = declared.keys().map(Ident::as_str);
+        let help = crate::model::finding::did_you_mean(&entry.key, "parameters", known);
+        let message = format!("there is no parameter `{}`", entry.key);
+        cx.report(Finding::error(codes::COMPOSE_PARAMETER, message).at(entry.origin).help(help));
+    }
+    values
+}
+
+fn node_of(of: &crate::model::Value, origin: Origin) -> Node {
+    use crate::model::Value as V;
+    let kind = match of {
+        V::Bool(is) => Kind::Bool(*is),
+        V::Int(is) => Kind::Int(*is),
+        V::Float(is) => Kind::Float(*is),
+        V::Str(is) => Kind::Str(is.to_string().into()),
+        V::Array(list) => Kind::List(list.iter().map(|of| node_of(of, origin)).collect()),
+        V::Record(fields) => {
+            let entry =
+                |(name, of): &(Ident, V)| Entry { key: name.to_string().into(), origin, value: node_of(of, origin) };
+            Kind::Map(fields.iter().map(entry).collect())
+        }
+    };
+    Node::new(kind, origin)
+}
