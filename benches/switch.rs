@@ -129,6 +129,7 @@ impl Switched {
             catalogue: libraries().catalogue(),
             activities: BTreeSet::from([loop_]),
             coordinators: BTreeSet::new(),
+            subsystems: Vec::new(),
             platform,
             clock: clock.clone(),
             limits: DeploymentLimits::default(),

@@ -448,6 +448,10 @@ pub const SAMPLES_LINE: usize = 1 << 20;
 /// quarter of an hour; more are not made one by one.
 pub const SAMPLES_WAKES: u32 = 1_000_000;
 
+/// Events that parents have raised and that subsystems have not taken up yet, of which it is told that nobody took them: more than that wait
+/// in no inbox.
+pub const OFFERED: usize = 1024;
+
 /// Subsystems of one deployment, in each other or beside each other: a fleet, and what a list of them still shows.
 pub const SUBSYSTEMS: usize = 256;
 

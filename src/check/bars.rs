@@ -7,7 +7,7 @@
 use super::adjacency::Adjacency;
 use super::explore::{Barred, Edge, Graph};
 use super::state::Move;
-use crate::model::monitor::MONITORS_TYPE;
+use crate::model::monitor::is_monitors;
 use crate::model::{EventName, Monitor, RunState, Value};
 use crate::system::View;
 use rustc_hash::FxHashMap;
@@ -90,11 +90,12 @@ impl Graph<'_, '_> {
         let Some(world) = self.product.worlds.get(world) else { return true };
         let mut watching: Vec<&Monitor> = Vec::new();
         world.system.for_each_component(&mut |node| {
-            if node.ty.name.as_str() == MONITORS_TYPE && node.state == RunState::Running {
+            if is_monitors(node.ty.name) && node.state == RunState::Running {
                 let enabled = |monitor: &&Monitor| {
-                    node.value(monitor.name).map_or(monitor.enabled, |value| *value == Value::Bool(true))
+                    node.value(monitor.own_name()).map_or(monitor.enabled, |value| *value == Value::Bool(true))
                 };
-                watching.extend(raising.clone().filter(enabled));
+                let own = |monitor: &&Monitor| monitor.run_by() == node.ty.name;
+                watching.extend(raising.clone().filter(own).filter(enabled));
             }
         });
         watching.into_iter().any(|monitor| {

@@ -5,7 +5,7 @@ use crate::model::codes::{
     MONITOR_EVENT_TAKEN, MONITOR_NO_SUCH_PART, MONITOR_NOT_A_NUMBER, MONITOR_NOT_RUN, MONITOR_UNHEARD, UNKNOWN_ACTIVITY,
 };
 use crate::model::finding::did_you_mean;
-use crate::model::monitor::{Condition, ConditionKind, MONITORS_TYPE, PortSignal, SignalKind, ValuePart};
+use crate::model::monitor::{Condition, ConditionKind, MONITORS_TYPE, PortSignal, SignalKind, ValuePart, is_monitors};
 use crate::model::statechart::is_internal;
 use crate::model::{
     Change, ComponentName, Deployment, Finding, Findings, Ident, MemberRef, Origin, PortType, ValueType,
@@ -35,7 +35,7 @@ pub fn condition(deployment: &Deployment, universe: &Universe, condition: &Condi
 /// Monitors that no component runs.
 fn never_run(deployment: &Deployment) -> Option<Finding> {
     let first = deployment.monitors.first()?;
-    let runs = |change: &Change| change.kind.makes().is_some_and(|(_, ty, _)| ty.as_str() == MONITORS_TYPE);
+    let runs = |change: &Change| change.kind.makes().is_some_and(|(_, ty, _)| is_monitors(ty));
     if deployment.configurations.iter().flat_map(|c| &c.changes).any(runs) {
         return None;
     }

@@ -7,7 +7,7 @@
 
 use super::universe::Universe;
 use crate::model::codes::DEPLOY_UNWATCHED;
-use crate::model::monitor::MONITORS_TYPE;
+use crate::model::monitor::is_monitors;
 use crate::model::{
     ChangeKind, ComponentName, ComponentType, Deployment, Direction, EventName, FAULTED, Finding, Findings, MemberRef,
     Origin, RunState, Target, ValueType,
@@ -33,7 +33,7 @@ pub fn check(deployment: &Deployment, universe: &Universe, charts: &[&Chart]) ->
         .filter_map(|name| {
             let why = if let Some((_, at)) = read.iter().find(|(read, _)| *read == name) {
                 (*at, "a configuration stands for what it sends")
-            } else if look.is(name, |ty| ty.name.as_str() == MONITORS_TYPE) {
+            } else if look.is(name, |ty| is_monitors(ty.name)) {
                 (Origin::NONE, "it runs the monitors")
             } else if reach.contains(&name) {
                 (Origin::NONE, "what it sends reaches an actuator")

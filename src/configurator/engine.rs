@@ -13,7 +13,7 @@ use super::running::{Purpose, Running};
 use super::safety::Safety;
 use super::suspects::Suspects;
 use super::switches::Fast;
-use crate::model::{Ask, ConfigId, Configuration, DeploymentLimits, RequestId, Snapshot, Verdict};
+use crate::model::{Ask, ConfigId, Configuration, DeploymentLimits, Ident, RequestId, Snapshot, Verdict};
 use crate::plan::PlanContext;
 use crate::platform::{Platform, PlatformEvent};
 use crate::stack::claims::Claims;
@@ -45,6 +45,7 @@ pub(super) struct Given {
     pub operator: FxHashSet<ConfigId>,
     pub context: PlanContext,
     pub coordinators: BTreeSet<Requester>,
+    pub subsystems: Vec<(Ident, Vec<Requester>)>,
     pub answers: AnswerSink,
     pub progress: Option<ProgressSink>,
     /// Who evaluates conditions.
@@ -361,6 +362,23 @@ impl Engine {
     pub fn number(&mut self) -> u64 {
         self.numbers += 1;
         self.numbers
+    }
+
+    /// What was in force in one life of a subsystem is not in force in the next: where all of its coordinators are down and nothing is left
+    /// of it, its frames are dropped.
+    pub fn empty_subsystems(&mut self) {
+        let down = |all: &[Requester]| all.iter().all(|one| self.down.contains(one));
+        let down: Vec<Ident> =
+            self.given.subsystems.iter().filter(|(_, all)| down(all)).map(|(path, _)| *path).collect();
+        for path in down {
+            if self.world.settle_down_in(path) {
+                self.forget_confirmations();
+                self.changed();
+                if let Some(progress) = &self.given.progress {
+                    progress(&Progress::Emptied(path));
+                }
+            }
+        }
     }
 
     /// Whether all coordinators are down.

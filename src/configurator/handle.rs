@@ -35,6 +35,8 @@ pub struct ConfiguratorSetup {
     pub activities: BTreeSet<Ident>,
     /// The names under which coordinators ask.
     pub coordinators: BTreeSet<Requester>,
+    /// The paths of subsystems, with the names under which all coordinators of each ask.
+    pub subsystems: Vec<(Ident, Vec<Requester>)>,
     /// Where the components live.
     pub platform: Arc<dyn Platform>,
     /// The time.
@@ -81,6 +83,7 @@ impl Configurator {
             operator: setup.operator.into_iter().collect(),
             context: PlanContext { activities: setup.activities, avoid: BTreeSet::new() },
             coordinators: setup.coordinators,
+            subsystems: setup.subsystems,
             answers: setup.answers.clone(),
             progress: setup.progress,
             conditions: setup.conditions,

@@ -108,6 +108,8 @@ pub enum Progress {
         /// Why.
         reason: Arc<Reason>,
     },
+    /// All coordinators of the subsystem of that path are down, and nothing is left of it.
+    Emptied(Ident),
     /// A later look at the platform shows otherwise what nothing was under way with.
     Differs(Arc<Residual>),
     /// A broken system is whole again.

@@ -100,6 +100,7 @@ impl Engine {
                     self.counts.leaving.store(false, std::sync::atomic::Ordering::Release);
                     self.leaves(false);
                 }
+                self.empty_subsystems();
                 if self.all_down() && self.world.settle_down() {
                     self.confirmations.clear();
                     self.changed();

@@ -2,7 +2,7 @@
 
 use super::diagram::{Diagram, DiagramEdge, DiagramNode, RankDirection, Subject, Tone};
 use super::text::short;
-use crate::model::monitor::{ConditionKind, MONITORS_TYPE, SignalKind};
+use crate::model::monitor::{ConditionKind, SignalKind, is_monitors};
 use crate::model::{
     Catalogue, ComponentName, Direction as PortDirection, MemberRef, Monitor, Policy, RunState, Snapshot, TypeName,
     Value,
@@ -20,7 +20,7 @@ pub fn components(title: &str, system: &Snapshot, catalogue: &Catalogue, monitor
         used.insert(*to);
     }
     used.extend(system.ports.keys());
-    let watching = |ty: TypeName| ty.as_str() == MONITORS_TYPE;
+    let watching = |ty: TypeName| is_monitors(ty);
     let watched: Vec<(&Monitor, BTreeSet<WatchedMember>)> = match system.components.values().any(|c| watching(c.ty)) {
         true => monitors.iter().map(|monitor| (monitor, watches(monitor))).collect(),
         false => Vec::new(),
@@ -65,16 +65,17 @@ pub fn components(title: &str, system: &Snapshot, catalogue: &Catalogue, monitor
         }
         if watching(component.ty) {
             // A row for each thing that is watched, not for each monitor: several watch one port.
-            for of in watched.iter().flat_map(|(_, of)| of).collect::<BTreeSet<_>>() {
+            let own = || watched.iter().filter(|(monitor, _)| monitor.run_by() == component.ty);
+            for of in own().flat_map(|(_, of)| of).collect::<BTreeSet<_>>() {
                 lines.push((*of, *name, node.ins.len()));
                 node.ins.push(of.to_string());
             }
-            for (monitor, _) in &watched {
-                let off = component.properties.get(&monitor.name) == Some(&Value::Bool(false));
+            for (monitor, _) in own() {
+                let off = component.properties.get(&monitor.own_name()) == Some(&Value::Bool(false));
                 let events: Vec<&str> = monitor.events().map(|event| event.as_str()).collect();
                 let arrow = if events.is_empty() { "" } else { " → " };
                 let off = if off { " (off)" } else { "" };
-                node.outs.push(format!("{}{off}{arrow}{}", monitor.name, events.join(", ")));
+                node.outs.push(format!("{}{off}{arrow}{}", monitor.own_name(), events.join(", ")));
             }
         }
         boxes.insert(*name, diagram.add(node));
@@ -171,6 +172,7 @@ fn tone(state: RunState) -> Tone {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::monitor::MONITORS_TYPE;
     use crate::model::monitor::{Condition, Sampling};
     use crate::model::{ComponentSnapshot, ComponentType, EventName, Ident, PortType, ValueType};
 

@@ -4,18 +4,28 @@
 //! configuration enables one by setting it, and its undo restores what was. What a monitor looks at need not exist, nor
 //! be connected: the component has probes of it.
 
-use crate::model::Monitor;
 use crate::model::monitor::MONITORS_TYPE;
+use crate::model::{Monitor, TypeName};
 use crate::monitor::{Bank, InputSample, Troubles};
 use crate::runtime::{
     Builder, Component, ComponentFactory, Context, EventOut, Libraries, Library, Out, Probes, Prop, Sight,
 };
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// The library with the component type that evaluates `monitors`.
+/// The library with the component types that evaluate `monitors`: one for those of each file.
 pub fn library(monitors: &[Monitor]) -> Library {
-    let plan = Arc::new(MonitorPlan::new(monitors));
-    Library::new("davit").with_kind(ComponentFactory::made_by(MONITORS_TYPE, move |b| Monitors::new_of(&plan, b)))
+    let mut files: BTreeMap<TypeName, Vec<Monitor>> = BTreeMap::new();
+    for monitor in monitors {
+        files.entry(monitor.run_by()).or_default().push(monitor.clone());
+    }
+    if files.is_empty() {
+        files.insert(TypeName::new(MONITORS_TYPE).expect("the name of a type"), Vec::new());
+    }
+    files.into_iter().fold(Library::new("davit"), |library, (ty, monitors)| {
+        let plan = Arc::new(MonitorPlan::new(&monitors));
+        library.with_kind(ComponentFactory::made_by(ty.as_str(), move |b| Monitors::new_of(&plan, b)))
+    })
 }
 
 /// The libraries of a deployment with these monitors: with one more if there are any.
@@ -109,7 +119,7 @@ impl Monitors {
         let events = b.doc("What the monitors raise.").event_output("events");
         let (mut enabled, mut verdicts, mut robustness) = (Vec::new(), Vec::new(), Vec::new());
         for monitor in &plan.monitors {
-            let name = monitor.name.as_str();
+            let name = monitor.name.last();
             let raises = || monitor.raise.map_or_else(|| "Watches.".to_owned(), |event| format!("Raises `{event}`."));
             let doc = monitor.description.clone().unwrap_or_else(raises);
             enabled.push(b.doc(&doc).property(name, monitor.enabled));

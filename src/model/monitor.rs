@@ -3,7 +3,7 @@
 //! What a condition means, to the instant, is said in `docs/monitors.md` and done in `crate::monitor`.
 
 use super::finding::Origin;
-use super::names::{ComponentName, EventName, Ident, MemberRef, NameError};
+use super::names::{ComponentName, EventName, Ident, MemberRef, NameError, TypeName};
 use super::run_state::RunState;
 use std::fmt;
 use std::time::Duration;
@@ -337,7 +337,29 @@ impl std::str::FromStr for PortSignal {
     }
 }
 
+/// Whether a type is that of a component that runs monitors: those of a deployment, or of a subsystem.
+pub fn is_monitors(ty: TypeName) -> bool {
+    ty.as_str().rsplit('/').next() == Some(MONITORS_TYPE)
+}
+
 impl Monitor {
+    /// The type of the component that runs it: the monitors of a subsystem are a type of their own.
+    ///
+    /// # Panics
+    /// Never: it is the name of a type.
+    pub fn run_by(&self) -> TypeName {
+        let path = self.name.as_str().rsplit_once('/').map_or(String::new(), |(path, _)| format!("{path}/"));
+        TypeName::new(&format!("{path}{MONITORS_TYPE}")).expect("the name of a type")
+    }
+
+    /// Its name in its own file: that of its property of the component that runs it.
+    ///
+    /// # Panics
+    /// Never: the end of a name is one.
+    pub fn own_name(&self) -> Ident {
+        Ident::new(self.name.last()).expect("the end of a name is one")
+    }
+
     /// Calls `f` with every condition in it, from the outside in.
     pub fn for_each_condition<'a>(&'a self, f: &mut impl FnMut(&'a Condition)) {
         self.when.for_each(f);

@@ -115,8 +115,11 @@ name!(
     "plain names (letters, digits, `_`) separated by `/`"
 );
 name!(
-    /// A component type's name: `Gain`, `youbot.Dynamics`.
-    TypeName, "component type name", |t| t.split('.').all(is_plain),
+    /// A component type's name: `Gain`, `youbot.Dynamics`; of what is a subsystem's own, with its path.
+    TypeName, "component type name", |t| {
+        let (path, own) = t.rsplit_once('/').map_or((None, t), |(path, own)| (Some(path), own));
+        own.split('.').all(is_plain) && path.is_none_or(|path| path.split('/').all(is_plain))
+    },
     "plain names (letters, digits, `_`) separated by `.`"
 );
 name!(

@@ -38,6 +38,25 @@ impl Statechart {
         })
     }
 
+    /// The events that transitions wait for, as often as they are listed.
+    pub fn waited_for(&self) -> Vec<EventName> {
+        fn collect(state: &State, all: &mut Vec<EventName>) {
+            for (trigger, _) in state.transitions.iter().flat_map(|transition| &transition.events) {
+                if let Trigger::Event(event) = trigger {
+                    all.push(*event);
+                }
+            }
+            for child in &state.children {
+                if let ChartNode::State(child) = child {
+                    collect(child, all);
+                }
+            }
+        }
+        let mut all = Vec::new();
+        collect(&self.root, &mut all);
+        all
+    }
+
     /// Whether a transition waits for an event of that name.
     pub fn waits_for(&self, name: &str) -> bool {
         let is = |trigger: &(Trigger, Origin)| matches!(&trigger.0, Trigger::Event(event) if event.as_str() == name);

@@ -4,7 +4,7 @@ use super::condition_walk::Looked;
 use super::configuration::{Call, Change, ChangeKind, Configuration};
 use super::deployment::{Coordinator, CoordinatorNaming, OperatorMay, SimulatedReaction, StepFault};
 use super::event::{Ask, UNDO, Verdict};
-use super::monitor::{Condition, MONITORS_TYPE, Monitor};
+use super::monitor::{Condition, Monitor, is_monitors};
 use super::names::{ComponentName, EventName, Ident, MemberRef, TypeName};
 use super::state_list::{StateEntry, StateList, Target};
 use super::statechart::{Action, ChartNode, State, Trigger, is_internal};
@@ -194,9 +194,4 @@ impl Within<'_> {
         });
         words.collect::<Vec<_>>().join(" ")
     }
-}
-
-/// Whether a type is that of a component that evaluates monitors: those of a deployment, or of a subsystem.
-pub fn is_monitors(ty: TypeName) -> bool {
-    ty.as_str().rsplit('/').next() == Some(MONITORS_TYPE)
 }

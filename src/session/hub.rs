@@ -376,6 +376,11 @@ impl Hub {
         self.lock().outstanding.is_empty()
     }
 
+    /// Whether every request that was made under that name has been answered.
+    pub fn has_answered(&self, by: &str) -> bool {
+        self.lock().outstanding.values().all(|outstanding| outstanding.by != by)
+    }
+
     /// What is wrong.
     pub fn faults(&self) -> Vec<ComponentFault> {
         self.lock().faults.clone()

@@ -2,7 +2,7 @@
 
 use super::Session;
 use super::log::StatusView;
-use crate::model::monitor::MONITORS_TYPE;
+use crate::model::monitor::is_monitors;
 use crate::model::{ActivityStatus, ComponentName, Ident, MemberRef, RunState, Value};
 use crate::monitor::{InputSample, MonitorInput};
 use serde::Serialize;
@@ -40,14 +40,14 @@ impl Session {
     pub fn look(&self, within: Duration) -> LookView {
         let status = self.status();
         let components = status.system.iter().flat_map(|system| &system.components);
-        let evaluating = components.filter(|(_, it)| it.ty.as_str() == MONITORS_TYPE);
+        let evaluating = components.filter(|(_, it)| is_monitors(it.ty));
         let mut monitors: Vec<Monitored> = Vec::new();
         let mut inputs: Vec<MonitorInput> = Vec::new();
         // Of which monitor, and whether it says how far it is.
         let mut of: Vec<(usize, bool)> = Vec::new();
         for (component, it) in evaluating {
-            for monitor in &self.deployment().monitors {
-                let name = monitor.name;
+            for monitor in self.deployment().monitors.iter().filter(|monitor| monitor.run_by() == it.ty) {
+                let name = monitor.own_name();
                 let enabled = it.properties.get(&name) == Some(&Value::Bool(true));
                 if enabled && it.state == RunState::Running {
                     for (port, distance) in [(format!("is_{name}"), false), (format!("robustness_of_{name}"), true)] {

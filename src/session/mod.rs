@@ -31,6 +31,7 @@ mod stands;
 mod steps;
 mod stopping;
 mod subscribers;
+mod subsystems;
 pub mod tap;
 mod wiring;
 

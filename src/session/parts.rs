@@ -17,6 +17,8 @@ use std::sync::atomic::AtomicU64;
 /// One coordinator of a session.
 pub(super) struct CoordinatorPart {
     pub name: Ident,
+    /// The subsystem that it is one of.
+    pub of: Option<Ident>,
     pub chart: Arc<Chart>,
     pub coordinator: CoordinatorHandle,
     pub up: Option<NodeId>,
@@ -68,6 +70,7 @@ impl CoordinatorPart {
             let state = |name: &str| chart.find(name).ok();
             parts.push(Self {
                 name,
+                of: own.of,
                 up: state(&own.up),
                 down: state(&own.down),
                 sees_all,

@@ -103,10 +103,13 @@ impl Session {
         if self.hub().is_stopping() && self.junction().begins(event) {
             return Err(NotRaised::Stopping);
         }
+        let subsystems = self.junction().subsystems();
+        let path = subsystems.and_then(|subsystems| subsystems.path_of(event));
+        let to = |part: &&CoordinatorPart| to(part.name) && (subsystems.is_none() || part.of == path);
         let incoming = self.junction().incoming(Class::Outside, event).watched(ticket);
         // All of them have room, or none hears of it.
         let (mut held, mut gone): (Vec<&CoordinatorPart>, bool) = (Vec::with_capacity(self.parts().len()), false);
-        for part in self.parts().iter().filter(|part| to(part.name)) {
+        for part in self.parts().iter().filter(to) {
             match part.coordinator.hold(incoming.class) {
                 Ok(()) => held.push(part),
                 Err(NotAccepted::Full) if part.may_hear(event) => {
@@ -139,6 +142,11 @@ impl Session {
         if gone && acted.is_none() {
             self.hub()
                 .note(Happening::Forced { note: format!("`{event}` was not delivered: the coordinator is gone") });
+        }
+        // One of safety is given on to every subsystem that has it.
+        for event in subsystems.map_or(&[][..], |subsystems| subsystems.given_on(event)) {
+            let path = subsystems.and_then(|subsystems| subsystems.path_of(*event));
+            self.junction().give_to(self.hub(), path, self.junction().incoming(Class::Outside, *event));
         }
         if unwatched { Err(NotAccepted::Full.into()) } else { Ok(acted) }
     }

@@ -5,14 +5,16 @@ use super::halt::Heeded;
 use super::hub::{Hub, Meaning};
 use super::log::{Happening, LoggedAnswer, StepTime};
 use super::steps::Steps;
+use super::subsystems::Subsystems;
 use crate::configurator::{Answer, Batch, ConfiguratorHandle, Progress, Reason, Request, Requester, Scope};
 use crate::coordinator::{ChartTrouble, Class, CoordinatorHandle, Delivered, Incoming, Listener, NotAccepted, Tag};
-use crate::model::{Ask, Deployment, EventName, FAULTED, Precedence, RequestId, Verdict};
+use crate::model::{Ask, Deployment, EventName, FAULTED, Ident, Precedence, RequestId, Verdict};
 use crate::platform::PlatformEvent;
 use crate::statechart::{Chart, EventId, FunctionOutput, NodeId, Printer, Raised};
 use crate::time::lock;
 use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, Weak};
 use std::time::Duration;
 
@@ -30,16 +32,60 @@ pub(super) struct Junction {
     urgent: FxHashMap<EventName, Precedence>,
     /// The events that begin and end the deployment.
     ends: Option<(EventName, EventName)>,
+    /// Its subsystems.
+    pub subsystems: Option<Arc<Subsystems>>,
+    /// Nobody drives it any more.
+    closed: AtomicBool,
     /// Held while an event is given to several coordinators: what one of them tells the others of it comes behind it everywhere.
     giving: Mutex<()>,
 }
 
 impl Junction {
     /// Of a deployment whose threads do not run yet.
-    pub fn new(deployment: &Deployment) -> Self {
+    pub fn new(deployment: &Deployment, subsystems: Arc<Subsystems>) -> Self {
         let urgent = deployment.urgent().map(|event| (event, deployment.precedence(event))).collect();
         let ends = Some((deployment.deploy.event, deployment.shutdown.event));
-        Self { urgent, ends, ..Self::default() }
+        Self { urgent, ends, subsystems: Some(subsystems), ..Self::default() }
+    }
+
+    /// Its subsystems, if it has any.
+    pub fn subsystems(&self) -> Option<&Subsystems> {
+        self.subsystems.as_deref().filter(|subsystems| !subsystems.is_empty())
+    }
+
+    /// Nobody drives it any more.
+    pub fn close(&self) {
+        self.closed.store(true, Ordering::Release);
+        if let Some(subsystems) = self.subsystems() {
+            subsystems.close();
+        }
+    }
+
+    /// Whether nobody drives it any more.
+    pub fn is_closed(&self) -> bool {
+        self.closed.load(Ordering::Acquire)
+    }
+
+    /// The coordinators of the subsystem of that path; none: of the deployment itself.
+    pub fn in_file(&self, path: Option<Ident>) -> Vec<CoordinatorHandle> {
+        let Some(subsystems) = self.subsystems() else { return self.all() };
+        let all = lock(&self.coordinators);
+        let own = all.iter().filter(|(name, _)| subsystems.is_for(path, *name));
+        own.map(|(_, coordinator)| coordinator.clone()).collect()
+    }
+
+    /// Gives an event to the coordinators of one file.
+    pub fn give_to(&self, hub: &Hub, path: Option<Ident>, incoming: Incoming) {
+        self.give(hub, self.in_file(path), incoming);
+    }
+
+    /// Gives an event to whom it is for; one of safety to the subsystems too.
+    fn give_all(&self, hub: &Hub, class: Class, event: EventName) {
+        let path = |event| self.subsystems().and_then(|subsystems| subsystems.path_of(event));
+        let also = self.subsystems().map_or(&[][..], |subsystems| subsystems.given_on(event));
+        for event in std::iter::once(&event).chain(also) {
+            self.give_to(hub, path(*event), self.incoming(class, *event));
+        }
     }
 
     /// Whether an event is the one that begins the deployment.
@@ -71,7 +117,12 @@ impl Junction {
             let _giving = self.giving();
             to.iter().map(|coordinator| coordinator.deliver(incoming)).collect()
         };
-        delivered.into_iter().for_each(|delivered| hub.taken(delivered));
+        for delivered in delivered {
+            if delivered.is_err() && incoming.ticket != 0 {
+                hub.taken_up(incoming.ticket, false);
+            }
+            hub.taken(delivered);
+        }
     }
 
     /// The coordinator that asks under that name.
@@ -104,7 +155,7 @@ pub(super) struct ToConfigurator {
 impl Listener for ToConfigurator {
     fn raised(&mut self, _: &Chart, batch: &[Raised]) {
         let mut requests = Batch::default();
-        let mut emitted: SmallVec<[EventName; 2]> = SmallVec::new();
+        let mut emitted: SmallVec<[(EventName, Tag); 2]> = SmallVec::new();
         for raised in batch {
             match self.hub.meaning(raised.name) {
                 Meaning::Request(ask) => {
@@ -119,7 +170,7 @@ impl Listener for ToConfigurator {
                 }
                 Meaning::Emitted(event) => {
                     self.hub.note(Happening::Emitted { event: event.to_string() });
-                    emitted.push(event);
+                    emitted.push((event, Tag::from(*raised)));
                 }
                 Meaning::UnknownUndo(name) => {
                     // There is no such ID: answered at once, as the table of requests says.
@@ -132,17 +183,22 @@ impl Listener for ToConfigurator {
                 }),
             }
         }
+        if let Some(junction) = self.junction.upgrade()
+            && let Some(subsystems) = junction.subsystems().filter(|_| !requests.requests.is_empty())
+        {
+            subsystems.asks(self.name);
+        }
         if let Some(configurator) = self.configurator() {
             // A full queue answers every request itself.
             let _ = configurator.submit(requests);
         }
         // Behind what the same step asks for.
-        for event in emitted {
+        for (event, tag) in emitted {
             // It may be what confirms a configuration.
             if let Some(configurator) = self.configurator() {
                 configurator.event(event);
             }
-            self.tell_others(event);
+            self.tell_others(event, tag);
         }
         self.tell_down();
     }
@@ -150,6 +206,9 @@ impl Listener for ToConfigurator {
     fn delivers(&mut self, event: EventName) {
         let Some(junction) = self.junction.upgrade() else { return };
         self.begins = junction.begins(event);
+        if let Some(subsystems) = junction.subsystems() {
+            subsystems.takes_up(self.name, event);
+        }
         if let Some(configurator) = self.configurator() {
             // It may wait behind the one that begins it.
             junction.tell_leaving(&configurator, event);
@@ -177,6 +236,11 @@ impl Listener for ToConfigurator {
 
     fn taken_up(&mut self, ticket: u64, delivered: Delivered) {
         self.hub.taken_up(ticket, delivered == Delivered::Taken);
+        if let Some(junction) = self.junction.upgrade()
+            && let Some(subsystems) = junction.subsystems()
+        {
+            subsystems.tell_ignored(&self.hub, &junction);
+        }
     }
 
     fn stale(&mut self, _: &Chart, event: EventName, _: Tag) {
@@ -185,6 +249,11 @@ impl Listener for ToConfigurator {
 
     fn rested(&mut self) {
         self.tell_down();
+        if let Some(junction) = self.junction.upgrade()
+            && let Some(subsystems) = junction.subsystems()
+        {
+            subsystems.look(self.name, &self.hub, &junction);
+        }
         // An event that moves nothing is written down nowhere: without this, who waits for "up" would not look again.
         self.hub.wake();
     }
@@ -243,7 +312,7 @@ impl ToConfigurator {
 
     /// What one coordinator emits is an event of the others that wait for it somewhere. It is a report, so that two
     /// coordinators that answer each other for ever delay neither an operator nor an answer.
-    fn tell_others(&self, event: EventName) {
+    fn tell_others(&self, event: EventName, tag: Tag) {
         let Some(junction) = self.junction.upgrade() else { return };
         if self.hub.is_stopping() && junction.begins(event) {
             return;
@@ -253,7 +322,18 @@ impl ToConfigurator {
             .filter(|(name, other)| *name != self.name && other.chart().event(event) != EventId::OTHER)
             .map(|(_, other)| other.clone())
             .collect();
-        junction.give(&self.hub, others, junction.incoming(Class::Report, event));
+        let mut incoming = junction.incoming(Class::Report, event);
+        let offered = junction
+            .subsystems()
+            .map(|subsystems| (subsystems, subsystems.offers(&self.hub, event, self.name, Some(tag), others.len())));
+        if let Some((_, Some(ticket))) = offered {
+            incoming = incoming.watched(ticket);
+        }
+        junction.give(&self.hub, others, incoming);
+        if let Some((subsystems, Some(_))) = offered {
+            // Nobody waits for it anywhere, or none had room.
+            subsystems.tell_ignored(&self.hub, &junction);
+        }
     }
 
     fn deliver(&self, incoming: Incoming) {
@@ -279,7 +359,13 @@ pub(super) fn on_progress(hub: &Hub, junction: &Junction, steps: &Steps, progres
             let reasons = reason.findings().into_iter().map(|finding| finding.message).collect();
             hub.note(Happening::Lost { event: event.to_string(), reasons });
             // In whatever state they are: it answers nothing that was asked there.
-            junction.give(hub, junction.all(), Incoming::new(Class::Notice, event));
+            let path = junction.subsystems().and_then(|subsystems| subsystems.path_of(event));
+            junction.give_to(hub, path, Incoming::new(Class::Notice, event));
+        }
+        Progress::Emptied(path) => {
+            if let Some(subsystems) = junction.subsystems() {
+                subsystems.emptied(*path, hub, junction);
+            }
         }
         Progress::Differs(residual) => hub.note(Happening::Forced { note: residual.cause.to_string() }),
         Progress::Recovered => {
@@ -320,6 +406,9 @@ fn give(hub: &Hub, junction: &Junction, answer: &Answer, steps: Vec<StepTime>, c
     }
     // Only now: who sees that all is answered also sees that the coordinator has something to react to.
     hub.settled(answer.request.id);
+    if let Some(subsystems) = junction.subsystems() {
+        subsystems.look(answer.request.requester, hub, junction);
+    }
 }
 
 /// What the platform reports becomes an event; a fault is told as `COMPONENT.faulted`.
@@ -329,7 +418,10 @@ pub(super) fn on_platform(hub: &Hub, junction: &Junction, event: &PlatformEvent)
         configurator.platform_event(event);
     }
     let (event, from) = match event {
-        PlatformEvent::Raised { event, component, .. } => (*event, component.to_string()),
+        PlatformEvent::Raised { event, component, .. } => {
+            let heard = junction.subsystems().map(|subsystems| subsystems.heard_of(component.as_str(), *event));
+            (heard.unwrap_or(*event), component.to_string())
+        }
         PlatformEvent::Faulted { component, reason, .. } => {
             hub.fault(component.as_str(), reason);
             let event = EventName::new(&format!("{component}{FAULTED}")).expect("a name with a suffix is one");
@@ -351,7 +443,7 @@ pub(super) fn on_platform(hub: &Hub, junction: &Junction, event: &PlatformEvent)
         junction.tell_leaving(configurator, event);
         make_safe(hub, configurator, event, Class::Report);
     }
-    junction.give(hub, junction.all(), junction.incoming(Class::Report, event));
+    junction.give_all(hub, Class::Report, event);
 }
 
 /// What a safety event did that acted by itself.

@@ -10,6 +10,7 @@ use super::recovery::Difference;
 use super::routes::{Junction, on_answer, on_platform, on_progress};
 use super::stands::Evaluator;
 use super::steps::Steps;
+use super::subsystems::Subsystems;
 use crate::configurator::{
     Batch, Conditions, Configurator, ConfiguratorHandle, ConfiguratorSetup, ConfiguratorView, Request, Requester,
 };
@@ -76,7 +77,8 @@ impl Session {
         let hub = Hub::new(&clock, deployment.configurations.iter().map(|c| c.id), emits);
         let safe = deployment.configurations.iter().filter(|c| c.safe).map(|c| c.id).collect();
         let hub = Arc::new(hub.with_safety(deployment.safety.iter().map(|(event, _)| *event), safe));
-        let junction = Arc::new(Junction::new(&deployment));
+        let subsystems = Arc::new(Subsystems::new(&deployment, &clock));
+        let junction = Arc::new(Junction::new(&deployment, subsystems.clone()));
         let steps = Arc::new(Steps::default());
         let evaluator =
             super::stands::needed(&deployment, &catalogue).then(|| Evaluator::start(&clock, &platform, &junction));
@@ -87,6 +89,7 @@ impl Session {
             catalogue,
             activities: deployment.activities.keys().copied().collect(),
             coordinators: deployment.coordinators.iter().map(|c| Requester::Coordinator(c.name.into())).collect(),
+            subsystems: scopes(&deployment),
             platform: platform.clone(),
             clock: clock.clone(),
             limits: deployment.limits,
@@ -103,6 +106,7 @@ impl Session {
         });
         *lock(&junction.configurator) = Some(configurator.clone());
         let parts = CoordinatorPart::start_all(&deployment, charts.into_iter().zip(functions), &clock, &hub, &junction);
+        subsystems.watch(&hub, &junction);
         {
             let (hub, junction) = (hub.clone(), junction.clone());
             platform.subscribe(Arc::new(move |event| on_platform(&hub, &junction, &event)));
@@ -381,29 +385,34 @@ impl Session {
         self.parts.iter().map(|part| (part.name.to_string(), part.coordinator.active())).collect()
     }
 
-    /// Whether every coordinator is at rest in that state of its own and nothing asked is unanswered: what is seen between
-    /// two equal epochs was so at one moment.
-    fn at_rest(&self, state: impl Fn(&CoordinatorPart) -> Option<NodeId>) -> bool {
+    /// Whether every coordinator (of the deployment itself, or of its subsystems too) is at rest in that state of its own and nothing asked is
+    /// unanswered: what is seen between two equal epochs was so at one moment.
+    fn at_rest(
+        &self,
+        counts: impl Fn(&CoordinatorPart) -> bool,
+        state: impl Fn(&CoordinatorPart) -> Option<NodeId>,
+    ) -> bool {
         let before = self.hub.epoch();
-        let rest = self.hub.all_answered()
-            && self.parts.iter().all(|part| {
+        let answered = |part: &CoordinatorPart| self.hub.has_answered(part.name.as_str());
+        let rest = (self.hub.all_answered() || self.parts.iter().filter(|part| counts(part)).all(answered))
+            && self.parts.iter().filter(|part| counts(part)).all(|part| {
                 part.coordinator.is_settled() && state(part).is_some_and(|id| part.coordinator.is_active(id))
             })
             // One that was looked at first may have been told something by one looked at later.
-            && self.parts.iter().all(|part| part.coordinator.is_settled());
+            && self.parts.iter().filter(|part| counts(part)).all(|part| part.coordinator.is_settled());
         rest && self.hub.epoch() == before
     }
 
     pub(super) fn is_up(&self) -> bool {
-        self.at_rest(|part| part.up)
+        self.at_rest(|part| part.of.is_none(), |part| part.up)
     }
 
     pub(super) fn is_down(&self) -> bool {
-        self.at_rest(|part| part.down)
+        self.hub.all_answered() && self.at_rest(|_| true, |part| part.down)
     }
 
     pub(super) fn failed_state(&self) -> Option<&str> {
-        self.parts.iter().find_map(CoordinatorPart::failed_state)
+        self.parts.iter().filter(|part| part.of.is_none()).find_map(CoordinatorPart::failed_state)
     }
 
     /// Why requests failed since the deployment began to come up, one line each.
@@ -446,6 +455,7 @@ impl Session {
         if let Some(evaluator) = &self.evaluator {
             evaluator.close();
         }
+        self.junction.close();
         lock(&self.junction.coordinators).clear();
         lock(&self.junction.configurator).take();
     }
@@ -472,6 +482,16 @@ impl FrameStatus {
             unseen: frame.unseen,
         }
     }
+}
+
+/// The subsystems of a deployment with the names under which all their coordinators ask, those of what is in them too.
+fn scopes(deployment: &Deployment) -> Vec<(Ident, Vec<Requester>)> {
+    let inside = |path: Ident| {
+        let own = deployment.coordinators.iter();
+        let own = own.filter(move |c| c.of.is_some_and(|of| of == path || of.local(path).is_some()));
+        own.map(|c| Requester::Coordinator(c.name.into())).collect()
+    };
+    deployment.all_subsystems().into_iter().map(|(path, _)| (path, inside(path))).collect()
 }
 
 /// For those who hold a session only to look at it.

@@ -254,6 +254,20 @@ impl Stack {
         self.committed.clear();
     }
 
+    /// The same of a subsystem of which nothing is left: its coordinators' frames, and those of others that touch nothing else.
+    pub fn discard_in(&mut self, path: Ident) {
+        let asks = |by: Requester| match by {
+            Requester::Coordinator(name) => name.as_str() == path.as_str() || name.local(path).is_some(),
+            Requester::Operator | Requester::Safety => false,
+        };
+        self.frames.retain(|frame| {
+            let touched = share::components(&frame.footprint);
+            let inside = !touched.is_empty() && touched.iter().all(|component| component.local(path).is_some());
+            !(asks(frame.requester) && frame.parts.iter().all(|part| asks(part.requester)) || inside)
+        });
+        self.committed.retain(|buried| !asks(buried.requester));
+    }
+
     /// Takes over what the parts of a transaction do to the stack, in their order, now that their steps are done. Answers
     /// the numbers of the frames pushed. `busy` are frames that others under way pop or hand over to, and those that wait for
     /// their confirmation: they are not squashed.

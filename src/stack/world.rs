@@ -1,9 +1,9 @@
 //! System, stack and what is broken, as one: all that requests are judged by and that they change.
 
 use super::{FrameId, Request, Requester, Residual, Stack};
-use crate::model::{Ask, ComponentName, ConfigId, Snapshot};
+use crate::model::{Ask, ComponentName, ConfigId, Ident, Snapshot};
 use crate::plan::footprint::{Saved, Slot};
-use crate::system::System;
+use crate::system::{System, View};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -124,6 +124,18 @@ impl World {
         if let Some(frame) = self.left_with(undo, held) {
             self.stack.unscope(frame);
         }
+    }
+
+    /// All coordinators of a subsystem are down. True: nothing of it is there any more, and what was in force of it is not.
+    pub fn settle_down_in(&mut self, path: Ident) -> bool {
+        let mut inside = false;
+        self.system.for_each_component(&mut |node| inside |= node.name.local(path).is_some());
+        let over =
+            !inside && !self.broken.iter().any(|broken| broken.components.iter().any(|c| c.local(path).is_some()));
+        if over {
+            self.stack.discard_in(path);
+        }
+        over
     }
 
     /// All coordinators are down. True: nothing is there any more, and what was in force in one life is not in force in the

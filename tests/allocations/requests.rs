@@ -68,6 +68,7 @@ fn a_request_for_a_prepared_switch_allocates_nothing() {
         catalogue: libraries.catalogue(),
         activities: BTreeSet::from([name]),
         coordinators: BTreeSet::new(),
+        subsystems: Vec::new(),
         platform,
         clock: clock.clone(),
         limits: DeploymentLimits::default(),

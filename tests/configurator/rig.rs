@@ -195,6 +195,7 @@ impl Rig {
             catalogue,
             activities,
             coordinators: BTreeSet::new(),
+            subsystems: Vec::new(),
             platform: wrap(platform.clone()),
             clock: clock.clone(),
             limits,

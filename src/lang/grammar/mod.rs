@@ -186,7 +186,7 @@ impl NameKind {
         match self {
             Self::Plain => "^[A-Za-z_][A-Za-z0-9_]*$",
             Self::Component | Self::Configuration => "^[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*$",
-            Self::Type => "^[A-Za-z_][A-Za-z0-9_]*(\\.[A-Za-z_][A-Za-z0-9_]*)*$",
+            Self::Type => "^([A-Za-z_][A-Za-z0-9_]*/)*[A-Za-z_][A-Za-z0-9_]*(\\.[A-Za-z_][A-Za-z0-9_]*)*$",
             Self::Event => "^\\S+$",
             Self::Member => "^[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*\\.[A-Za-z_][A-Za-z0-9_]*$",
         }

@@ -1,0 +1,338 @@
+//! The subsystems of a deployment that runs (semantics: *Composition*): who hears what, and what a parent is told without anybody writing it.
+
+use super::hub::Hub;
+use super::log::Happening;
+use super::routes::Junction;
+use crate::configurator::Requester;
+use crate::coordinator::{Class, CoordinatorHandle, Incoming, Tag};
+use crate::limits;
+use crate::model::subsystem::{IGNORED, Seen, standing};
+use crate::model::{Deployment, EventName, Ident, Standing};
+use crate::statechart::NodeId;
+use crate::time::{Clock, Signal, Time, lock};
+use rustc_hash::FxHashMap;
+use std::sync::{Arc, Mutex, Weak};
+use std::time::Duration;
+
+/// A subsystem of a deployment.
+#[derive(Debug)]
+struct Known {
+    path: Ident,
+    /// That of its parent; none: the deployment itself.
+    parent: Option<Ident>,
+    begins: EventName,
+    up_within: Duration,
+    ends: EventName,
+    down_within: Duration,
+    /// Its coordinators, with the states that count.
+    coordinators: Vec<(Requester, Counting)>,
+}
+
+/// The names of states of a coordinator.
+#[derive(Debug)]
+struct Counting {
+    up: String,
+    failed: Vec<String>,
+    down: String,
+}
+
+/// What is known of a subsystem.
+#[derive(Debug, Default)]
+struct Life {
+    told: Option<Standing>,
+    /// When it has to be up, and down.
+    up_until: Option<Time>,
+    down_until: Option<Time>,
+    /// It was down with nothing left, and has asked for nothing since.
+    empty: bool,
+}
+
+/// An event that a subsystem may take or not.
+#[derive(Debug, Clone, Copy)]
+struct Offered {
+    ticket: u64,
+    event: EventName,
+    by: Requester,
+    tag: Option<Tag>,
+}
+
+/// The subsystems.
+pub(super) struct Subsystems {
+    all: Vec<Known>,
+    /// The subsystem that components with this path are in.
+    paths: FxHashMap<&'static str, Ident>,
+    /// As what an event is heard that something in a subsystem raises, as far as somebody there waits for it.
+    heard: FxHashMap<(Ident, EventName), EventName>,
+    /// Safety events that are given on.
+    safety: FxHashMap<EventName, Vec<EventName>>,
+    /// Events that a parent may raise.
+    accepted: FxHashMap<EventName, usize>,
+    /// The paths of coordinators.
+    of: FxHashMap<Requester, Ident>,
+    lives: Mutex<Vec<Life>>,
+    offered: Mutex<Vec<Offered>>,
+    clock: Clock,
+    wake: Signal,
+}
+
+impl Subsystems {
+    /// Those of a deployment.
+    pub fn new(deployment: &Deployment, clock: &Clock) -> Self {
+        let all = deployment.all_subsystems();
+        let mut known = Vec::new();
+        let (mut paths, mut heard, mut safety, mut accepted) =
+            (FxHashMap::default(), FxHashMap::default(), FxHashMap::default(), FxHashMap::default());
+        let mut give_on = |from: EventName, to: EventName| safety.entry(from).or_insert_with(Vec::new).push(to);
+        for (path, subsystem) in &all {
+            let own = &*subsystem.own;
+            let parent = path.as_str().rsplit_once('/').map(|(parent, _)| parent);
+            let parent = parent.and_then(|parent| all.iter().map(|(path, _)| *path).find(|of| of.as_str() == parent));
+            paths.insert(path.as_str(), *path);
+            for chart in own.coordinators.iter().filter(|coordinator| coordinator.of.is_none()) {
+                for event in chart.chart.waited_for() {
+                    heard.insert((*path, event), event.within(*path));
+                }
+            }
+            let accepts = own.interface.accepts.iter().map(|(event, _)| *event);
+            for event in accepts.chain([own.deploy.event, own.shutdown.event]) {
+                accepted.insert(event.within(*path), known.len());
+            }
+            // To every child, whatever lies between.
+            for (event, _) in &own.safety {
+                let theirs = event.within(*path);
+                let above = std::iter::once((None, deployment)).chain(
+                    all.iter().filter(|(of, _)| path.local(*of).is_some()).map(|(of, above)| (Some(*of), &*above.own)),
+                );
+                for (of, above) in above {
+                    if above.own_part().safety.iter().any(|(declared, _)| declared == event) {
+                        give_on(of.map_or(*event, |of| event.within(of)), theirs);
+                    }
+                }
+            }
+            let counting = deployment.coordinators.iter().filter(|coordinator| coordinator.of == Some(*path));
+            known.push(Known {
+                path: *path,
+                parent,
+                begins: own.deploy.event.within(*path),
+                up_within: own.deploy.within,
+                ends: own.shutdown.event.within(*path),
+                down_within: own.shutdown.within,
+                coordinators: counting
+                    .map(|own| {
+                        let states =
+                            Counting { up: own.up.clone(), failed: own.failed.clone(), down: own.down.clone() };
+                        (Requester::Coordinator(own.name.into()), states)
+                    })
+                    .collect(),
+            });
+        }
+        let of = deployment
+            .coordinators
+            .iter()
+            .filter_map(|coordinator| Some((Requester::Coordinator(coordinator.name.into()), coordinator.of?)))
+            .collect();
+        let lives = Mutex::new(known.iter().map(|_| Life { empty: true, ..Life::default() }).collect());
+        let (clock, wake) = (clock.clone(), clock.signal());
+        Self { all: known, paths, heard, safety, accepted, of, lives, offered: Mutex::default(), clock, wake }
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.all.is_empty()
+    }
+
+    /// An event of a component as it is heard: in the subsystem that the component is in, and nowhere else.
+    pub fn heard_of(&self, component: &str, event: EventName) -> EventName {
+        if self.is_empty() {
+            return event;
+        }
+        let path = component.rsplit_once('/').and_then(|(path, _)| self.paths.get(path));
+        match path {
+            Some(path) if event.local(*path).is_none() => {
+                self.heard.get(&(*path, event)).copied().unwrap_or_else(|| event.within(*path))
+            }
+            _ => event,
+        }
+    }
+
+    /// The path of the subsystem whose coordinators an event is for; none: those of the deployment itself.
+    pub fn path_of(&self, event: EventName) -> Option<Ident> {
+        if self.is_empty() {
+            return None;
+        }
+        let text = event.as_str();
+        let ends = text.match_indices('/').map(|(at, _)| at).collect::<Vec<_>>();
+        ends.into_iter().rev().find_map(|at| self.paths.get(&text[..at]).copied())
+    }
+
+    /// Whether an event of that path is for a coordinator. What is emitted goes another way.
+    pub fn is_for(&self, path: Option<Ident>, coordinator: Requester) -> bool {
+        self.of.get(&coordinator).copied() == path
+    }
+
+    /// The safety events of subsystems that one is given on as.
+    pub fn given_on(&self, event: EventName) -> &[EventName] {
+        self.safety.get(&event).map_or(&[], Vec::as_slice)
+    }
+
+    /// A coordinator asks for something: it is not down any more.
+    pub fn asks(&self, by: Requester) {
+        let Some(path) = self.of.get(&by) else { return };
+        let mut lives = lock(&self.lives);
+        for (known, life) in self.all.iter().zip(lives.iter_mut()) {
+            if known.path == *path || path.local(known.path).is_some() {
+                life.empty = false;
+            }
+        }
+    }
+
+    /// A coordinator takes an event up: it may be the one that begins or ends its subsystem.
+    pub fn takes_up(&self, by: Requester, event: EventName) {
+        let Some(path) = self.of.get(&by) else { return };
+        let Some(at) = self.all.iter().position(|known| known.path == *path) else { return };
+        let known = &self.all[at];
+        let now = self.clock.now();
+        let mut lives = lock(&self.lives);
+        if event == known.begins {
+            (lives[at].up_until, lives[at].down_until) = (Some(now + known.up_within), None);
+        } else if event == known.ends {
+            (lives[at].down_until, lives[at].up_until) = (Some(now + known.down_within), None);
+        } else {
+            return;
+        }
+        drop(lives);
+        self.wake.notify();
+    }
+
+    /// All coordinators of a subsystem are down, and nothing is left of it.
+    pub fn emptied(&self, path: Ident, hub: &Hub, junction: &Junction) {
+        if let Some(at) = self.all.iter().position(|known| known.path == path) {
+            lock(&self.lives)[at].empty = true;
+            self.look_at(at, hub, junction);
+        }
+    }
+
+    /// Something has changed that may be told of whoever asks under that name.
+    pub fn look(&self, by: Requester, hub: &Hub, junction: &Junction) {
+        let Some(path) = self.of.get(&by) else { return };
+        if let Some(at) = self.all.iter().position(|known| known.path == *path) {
+            self.look_at(at, hub, junction);
+        }
+    }
+
+    fn look_at(&self, at: usize, hub: &Hub, junction: &Junction) {
+        let known = &self.all[at];
+        let seen = self.seen(known, hub, junction);
+        let told = {
+            let mut lives = lock(&self.lives);
+            let life = &mut lives[at];
+            let now = self.clock.now();
+            let over = |until: Option<Time>| until.is_some_and(|until| now >= until);
+            let seen = Seen {
+                down: seen.down && life.empty,
+                late: over(life.up_until),
+                stranded: over(life.down_until),
+                ..seen
+            };
+            let told = standing(life.told, seen);
+            if told.is_some() {
+                life.told = told;
+            }
+            match told {
+                Some(Standing::Up) => life.up_until = None,
+                Some(Standing::Down) => life.down_until = None,
+                _ => {}
+            }
+            told
+        };
+        let Some(told) = told else { return };
+        let event = told.event(known.path);
+        hub.note(Happening::Event { event: event.to_string(), from: known.path.to_string() });
+        junction.give_to(hub, known.parent, Incoming::new(Class::Report, event));
+    }
+
+    fn seen(&self, known: &Known, hub: &Hub, junction: &Junction) -> Seen {
+        let mut seen = Seen { up: true, down: true, ..Seen::default() };
+        let before = hub.epoch();
+        for (name, states) in &known.coordinators {
+            let Some(coordinator) = junction.coordinator(*name) else { return Seen::default() };
+            let rest = coordinator.is_settled() && hub.has_answered(&name.to_string());
+            seen.up &= rest && is_in(&coordinator, &states.up);
+            seen.down &= rest && is_in(&coordinator, &states.down);
+            seen.failed |= states.failed.iter().any(|state| is_in(&coordinator, state));
+        }
+        // What is seen between two equal counts was so at one moment; else whoever changed it lets it be looked at again.
+        if known.coordinators.len() > 1 && hub.epoch() != before {
+            Seen { failed: seen.failed, ..Seen::default() }
+        } else {
+            seen
+        }
+    }
+
+    /// An event that a parent raises, with the number under which it is given; none: nobody needs to be told.
+    pub fn offers(&self, hub: &Hub, event: EventName, by: Requester, tag: Option<Tag>, to: usize) -> Option<u64> {
+        self.accepted.get(&event)?;
+        let mut offered = lock(&self.offered);
+        if offered.len() >= limits::OFFERED {
+            return None;
+        }
+        let ticket = hub.ticket(to);
+        offered.push(Offered { ticket, event, by, tag });
+        Some(ticket)
+    }
+
+    /// Tells of events that no transition took.
+    pub fn tell_ignored(&self, hub: &Hub, junction: &Junction) {
+        if self.is_empty() {
+            return;
+        }
+        let mut ignored = Vec::new();
+        lock(&self.offered).retain(|of| match hub.was_heard(of.ticket) {
+            None => true,
+            Some(heard) => {
+                hub.forget(of.ticket);
+                ignored.extend((!heard).then_some(*of));
+                false
+            }
+        });
+        for of in ignored {
+            let event = EventName::new(&format!("{}{IGNORED}", of.event)).expect("an event with a suffix is one");
+            hub.note(Happening::Event { event: event.to_string(), from: "configurator".to_owned() });
+            if let Some(coordinator) = junction.coordinator(of.by) {
+                hub.taken(coordinator.deliver(Incoming::new(Class::Notice, event).tagged(of.tag)));
+            }
+        }
+    }
+
+    /// Starts what looks whether a time is over. It ends with the junction.
+    pub fn watch(self: &Arc<Self>, hub: &Arc<Hub>, junction: &Arc<Junction>) {
+        if self.is_empty() {
+            return;
+        }
+        let (own, hub, junction): (_, _, Weak<Junction>) = (self.clone(), hub.clone(), Arc::downgrade(junction));
+        self.clock.spawn("subsystems", move || {
+            loop {
+                let now = own.clock.now();
+                let of =
+                    |life: &Life| life.up_until.into_iter().chain(life.down_until).filter(|until| *until > now).min();
+                let next = lock(&own.lives).iter().filter_map(of).min();
+                own.wake.wait(next.unwrap_or(Time::NEVER));
+                let Some(junction) = junction.upgrade() else { return };
+                if junction.is_closed() {
+                    return;
+                }
+                (0..own.all.len()).for_each(|at| own.look_at(at, &hub, &junction));
+            }
+        });
+    }
+
+    /// Ends that.
+    pub fn close(&self) {
+        self.wake.notify();
+    }
+}
+
+fn is_in(coordinator: &CoordinatorHandle, state: &str) -> bool {
+    let node: Option<NodeId> = coordinator.chart().find(state).ok();
+    node.is_some_and(|node| coordinator.is_active(node))
+}
