@@ -48,6 +48,7 @@ impl Product<'_> {
         }
         for name in &reaction.emitted {
             for state in &mut states {
+                self.tells_child(state, *name);
                 self.confirm(state, *name);
                 self.spread(state, *name, Some(by));
             }

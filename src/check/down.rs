@@ -263,6 +263,8 @@ fn left_in(product: &Product<'_>, state: &ProductState) -> Vec<ComponentName> {
     let mut names = Vec::new();
     if let Some(world) = product.worlds.get(state.world).filter(|_| product.is_down(state)) {
         world.system.for_each_component(&mut |node| names.push(node.name));
+        // What is a subsystem's own is taken away by that.
+        names.retain(|name: &ComponentName| product.children.iter().all(|child| name.local(child.path).is_none()));
     }
     names.sort_unstable();
     names

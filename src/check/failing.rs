@@ -58,7 +58,7 @@ impl Graph<'_, '_> {
         let open = self.spread_from(dropped.map(|edge| edge.to).collect(), goes_on);
         let left = |at: u32| {
             let world = self.product.worlds.get(state(at).world);
-            world.is_some_and(|world| !world.system.is_empty() || !world.stack.is_empty())
+            world.is_some_and(|world| !world.is_bare() || !world.stack.is_empty())
         };
         let open = (0u32..).zip(open).filter(|(_, open)| *open).map(|(at, _)| at);
         let rests = |at: &u32| state(*at).is_at_rest() && !self.product.is_down(state(*at)) && left(*at);

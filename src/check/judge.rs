@@ -37,6 +37,8 @@ impl Graph<'_, '_> {
         self.ways_down(&stuck, &mut found);
         self.safety(&mut found);
         self.warned(&mut found);
+        self.promises(&mut found);
+        self.exports_stay(&mut found);
         found
     }
 

@@ -90,7 +90,9 @@ impl Product<'_> {
         let busy: SmallVec<[bool; 4]> = (0..self.members.len()).map(|number| self.is_busy(state, number)).collect();
         for at in heard {
             let name = self.outside[at];
-            if self.waits_for_others() && state.stopping && name == self.deployment.deploy.event {
+            if self.waits_for_others() && state.stopping && name == self.deployment.deploy.event
+                || self.is_silent(state, name)
+            {
                 continue;
             }
             let takes =
@@ -297,7 +299,7 @@ impl Product<'_> {
             asks.extend(self.operator.iter().filter(fits).map(|id| Ask::Apply(*id)));
         }
         // Nobody has anything to do with what is not there, but to make it.
-        let empty = self.worlds.get(state.world).is_some_and(|world| world.system.is_empty()) && state.desk.is_empty();
+        let empty = self.worlds.get(state.world).is_some_and(|world| world.is_bare()) && state.desk.is_empty();
         let makes = |ask: &Ask| match ask {
             Ask::Apply(id) => {
                 self.worlds.configuration(*id).is_some_and(|configuration| created(configuration).next().is_some())

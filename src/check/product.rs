@@ -16,6 +16,7 @@ use super::coupling;
 use super::effort::{Effort, Left};
 use super::members::{Member, hears_loss, members};
 use super::outcome::{Comes, ConcurrentWork, EMPTY, Held, Went, WorldId};
+use super::promises::Child;
 use super::reactions::Asked;
 use super::shared_list::{Shared, SharedList};
 use super::state::{Failed, Move, Next, Nexts, ProductState, Reacts, bit, index, one};
@@ -89,6 +90,8 @@ pub struct Product<'a> {
     pub by_hand: usize,
     /// What is set aside where its undo fails.
     pub(super) aside: Aside,
+    /// The subsystems of the deployment, as its coordinators know them.
+    pub(super) children: Vec<Child>,
     /// How much more is followed.
     pub(super) effort: Left<'a>,
     /// What is known of reactions to steps.
@@ -144,6 +147,7 @@ impl<'a> Product<'a> {
             crosses: false,
             by_hand: 1,
             aside: Aside::default(),
+            children: Child::all(deployment),
             effort: Effort::default().into(),
             reacts: FxHashMap::default(),
             spare: Vec::new(),
@@ -198,6 +202,7 @@ impl<'a> Product<'a> {
             stopping: false,
             leaving: false,
             elsewhere: false,
+            children: 0,
             moved: 0,
             across: false,
             in_transit: SharedList::new(),
@@ -283,6 +288,8 @@ impl<'a> Product<'a> {
 
     /// A coordinator hears an event.
     pub(super) fn hear(&mut self, state: ProductState, number: usize, event: EventId, by: Move, nexts: &mut Nexts) {
+        let mut state = state;
+        self.hears_of_child(&mut state, number, event);
         for state in self.react(state, number, event) {
             let next = Next::plain(by, self.settle(state), Failed::Nothing);
             nexts.all.push(next);
@@ -373,7 +380,7 @@ impl<'a> Product<'a> {
 
     /// Whether all of them are down, with nothing left to be answered or heard.
     pub fn is_down(&self, state: &ProductState) -> bool {
-        state.is_at_rest() && self.all_in(state, |member| member.down)
+        state.is_at_rest() && self.all_in(state, |member| member.down) && self.children_down(state)
     }
 
     /// Whether all of them have come to *down* and asked for nothing since.

@@ -9,8 +9,8 @@ use super::report::{Accepted, Explored, Report};
 use super::state::Failed;
 use super::verdict::CheckVerdict;
 use super::{
-    alone, configurations as single, coordinator, coupling, declared, lets_go, library, monitors as watched, purity,
-    safety, settings, simulated, types, undriven, unhandled, universe, unwatched, ways,
+    alone, composed, configurations as single, coordinator, coupling, declared, interface, lets_go, library,
+    monitors as watched, purity, safety, settings, simulated, types, undriven, unhandled, universe, unwatched, ways,
 };
 use crate::limits;
 use crate::model::codes::{CLASH, POST_ON_DESTROYED, PRE_ON_CREATED, TOUCHES_DESTROYED};
@@ -28,7 +28,11 @@ pub fn run(deployment: impl Into<Arc<Deployment>>, catalogue: &Catalogue) -> Rep
 
 /// The same with more effort, or less.
 pub fn run_with(deployment: impl Into<Arc<Deployment>>, catalogue: &Catalogue, effort: Effort<'_>) -> Report {
-    let shared = deployment.into();
+    composed::run(deployment.into(), catalogue, &|own, catalogue| run_one(own, catalogue, effort))
+}
+
+/// The check of one file.
+fn run_one(shared: Arc<Deployment>, catalogue: &Catalogue, effort: Effort<'_>) -> Report {
     let deployment = &*shared;
     let universe = universe::Universe::new(deployment, catalogue);
     let mut findings = types::check(deployment, catalogue);
@@ -58,6 +62,8 @@ pub fn run_with(deployment: impl Into<Arc<Deployment>>, catalogue: &Catalogue, e
         let mut findings = watched::events(deployment, &charts);
         findings.extend(simulated::events(deployment, &charts));
         findings.extend(unwatched::check(deployment, &universe, &charts));
+        findings.extend(interface::check(deployment, &universe, &charts));
+        findings.extend(interface::between(deployment, &charts, catalogue));
         let of = |number| coupling::view(deployment, &charts, number);
         let views: Vec<Deployment> = (0..all).filter_map(of).collect();
         let told: BTreeSet<EventName> = charts

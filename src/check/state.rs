@@ -88,6 +88,8 @@ pub struct ProductState {
     pub leaving: bool,
     /// A safe configuration of those who have nothing to do with these has come since it is being stopped, and is in force.
     pub elsewhere: bool,
+    /// How its subsystems stand, as far as their parent can know ([`promises`](super::promises)).
+    pub children: u64,
     /// Coordinators that have moved since the inboxes were empty, by their bits. Kept only where events come meanwhile.
     pub moved: u64,
     /// One came meanwhile.

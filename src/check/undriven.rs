@@ -50,7 +50,9 @@ fn driven(deployment: &Deployment) -> FxHashSet<MemberRef> {
         OperatorMay::Set(member) => Some(*member),
         OperatorMay::Apply(_) => None,
     });
-    links(deployment).into_iter().map(|(_, to)| to).chain(written).chain(set).collect()
+    // What is exported is the parent's to drive.
+    let exported = deployment.interface.exports.values().map(|export| export.of);
+    links(deployment).into_iter().map(|(_, to)| to).chain(written).chain(set).chain(exported).collect()
 }
 
 fn required(port: MemberRef, created: Origin, declared: Origin) -> Finding {

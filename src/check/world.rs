@@ -100,8 +100,17 @@ impl<'a> Worlds<'a> {
             asked: FxHashSet::default(),
             judged: FxHashSet::default(),
         };
-        let system = System::new(Arc::new(catalogue.clone()));
-        worlds.intern(World::new(system, Stack::remembering(deployment.limits.stack)));
+        let mut system = System::new(Arc::new(catalogue.clone()));
+        // What its subsystems export is there: when it may be touched is judged apart.
+        for subsystem in &deployment.subsystems {
+            let made = worlds.configurations.get(&ConfigId::from(subsystem.name));
+            if let Some(Ok(planned)) = made.map(|made| plan(&system, made, &worlds.context)) {
+                planned.steps.iter().for_each(|planned| step::effect(&planned.step, &mut system));
+            }
+        }
+        let given = system.len();
+        let world = World::new(system, Stack::remembering(deployment.limits.stack));
+        worlds.intern(World { given, ..world });
         worlds
     }
 

@@ -191,7 +191,7 @@ impl Resolve<'_> {
     }
 
     fn condition(&self, cx: &mut Cx, of: &mut Condition, origin: Origin) {
-        let at = if of.origin == Origin::NONE { origin } else { of.origin };
+        let at = if of.origin.is_some() { of.origin } else { origin };
         of.for_each_member_mut(&mut |looked| match looked {
             Looked::Member(member) => *member = self.member(cx, *member, ExportKind::Port, at, ""),
             Looked::Component(component) => self.not_own(cx, *component, at),

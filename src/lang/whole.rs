@@ -85,7 +85,7 @@ impl Reader<'_> {
             }
         }
         let mut with = draft.with;
-        let at = if part.at == Origin::NONE { origin } else { part.at };
+        let at = if part.at.is_some() { part.at } else { origin };
         for entry in interface::given(cx, declared, given, &part.of, at) {
             if let Some(twice) = with.iter().find(|other| other.key == entry.key) {
                 let message = format!("`{}` is a parameter, and given under `with` too", entry.key);

@@ -1,7 +1,7 @@
 //! Component types: what components of a type have and may do.
 
 use super::finding::Origin;
-use super::monitor::{Condition, SELF};
+use super::monitor::{Condition, SELF, is_monitors};
 use super::names::{ComponentName, Ident, TypeName};
 use super::run_state::RunState;
 use super::value::{FitError, Value, ValueType};
@@ -274,6 +274,21 @@ impl Catalogue {
     /// An empty one.
     pub fn new() -> Self {
         Self::default()
+    }
+
+    /// The types that the file of the subsystem of that path knows, by their names there.
+    #[must_use]
+    pub fn known_in(&self, path: Ident) -> Self {
+        let mut known = Self::new();
+        for ty in self.iter() {
+            if let Some(name) = ty.name.local(path).and_then(|name| name.parse().ok()) {
+                known.insert(ComponentType { name, ..ComponentType::clone(ty) });
+            } else if !ty.name.as_str().contains('/') && !is_monitors(ty.name) {
+                // The monitors of the parent are none of its own.
+                known.insert(ty.clone());
+            }
+        }
+        known
     }
 
     /// Adds a type; answers the one it replaced, if the name was taken.

@@ -174,6 +174,21 @@ impl ComponentName {
 }
 
 /// Every plain name is a component name without a prefix.
+/// A subsystem is written like a configuration of its name where a configuration is wanted.
+impl From<Ident> for ConfigId {
+    fn from(name: Ident) -> Self {
+        Self(name.0)
+    }
+}
+
+impl TypeName {
+    /// The same of one component alone: what is seen of it from outside.
+    #[must_use]
+    pub fn of(self, component: ComponentName) -> Self {
+        Self(Ustr::from(&format!("{component}/{self}")))
+    }
+}
+
 impl From<Ident> for ComponentName {
     fn from(name: Ident) -> Self {
         Self(name.0)

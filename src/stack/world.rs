@@ -47,12 +47,19 @@ pub struct World {
     pub broken: Vec<Broken>,
     /// Components whose call has not returned.
     pub quarantined: Vec<ComponentName>,
+    /// So many components are there that nobody here made: what subsystems are followed by.
+    pub given: usize,
 }
 
 impl World {
     /// A system with nothing in force.
     pub fn new(system: System, stack: Stack) -> Self {
-        Self { system, stack, broken: Vec::new(), quarantined: Vec::new() }
+        Self { system, stack, broken: Vec::new(), quarantined: Vec::new(), given: 0 }
+    }
+
+    /// Whether nothing is there that anybody here has made.
+    pub fn is_bare(&self) -> bool {
+        self.system.len() == self.given
     }
 
     /// What is broken about one of these components, if anything is.
@@ -141,7 +148,7 @@ impl World {
     /// All coordinators are down. True: nothing is there any more, and what was in force in one life is not in force in the
     /// next, nor waited for.
     pub fn settle_down(&mut self) -> bool {
-        let over = self.system.is_empty() && self.broken.is_empty();
+        let over = self.is_bare() && self.broken.is_empty();
         if over {
             self.stack.discard();
         }

@@ -1,0 +1,182 @@
+//! A deployment with subsystems: each file is followed alone, and never the product of them (semantics: *Composition*).
+//!
+//! A subsystem is followed as the deployment that its file is: whatever its parent may raise comes from outside there, at any time. The
+//! parent is followed against subsystems that may tell whatever they tell at all, once it has begun them; of what they are made of there
+//! are the components that they export, which are there while that is promised ([`promises`](super::promises) holds both to it).
+
+use super::report::{Accepted, Explored, Report};
+use super::verdict::CheckVerdict;
+use crate::model::subsystem::ExportKind;
+use crate::model::{
+    Catalogue, Change, ChangeKind, ComponentName, ComponentType, ConfigId, Configuration, Deployment, EventName,
+    Finding, Ident, StateEntry, StateList, Subsystem, Target, Value, ValueType, Wanted,
+};
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+/// Checks a deployment, each of its files alone: `one` checks one.
+pub fn run(
+    whole: Arc<Deployment>,
+    catalogue: &Catalogue,
+    one: &dyn Fn(Arc<Deployment>, &Catalogue) -> Report,
+) -> Report {
+    if whole.own.is_none() {
+        return one(whole, catalogue);
+    }
+    let mut reports: Vec<(Option<Ident>, Report)> = Vec::new();
+    let mut done: Vec<&Arc<Deployment>> = Vec::new();
+    for subsystem in &whole.subsystems {
+        if done.iter().any(|own| Arc::ptr_eq(own, &subsystem.own)) {
+            continue;
+        }
+        done.push(&subsystem.own);
+        let local = catalogue.known_in(subsystem.name);
+        reports.push((Some(subsystem.name), run(subsystem.own.clone(), &local, one)));
+    }
+    let (view, types) = parents_view(whole.own_part(), catalogue);
+    reports.push((None, one(Arc::new(view), &types)));
+    put_together(whole, reports)
+}
+
+/// A deployment as its own file has it, with what its subsystems export.
+fn parents_view(own: &Deployment, catalogue: &Catalogue) -> (Deployment, Catalogue) {
+    let mut view = own.clone();
+    let mut types = Catalogue::new();
+    for ty in catalogue.iter().filter(|ty| !ty.name.as_str().contains('/')) {
+        types.insert(ty.clone());
+    }
+    for subsystem in &own.subsystems {
+        let exported = exported(subsystem, catalogue);
+        let accepted = accepted(subsystem).into_iter().map(|event| (event, subsystem.origin));
+        for (event, origin) in accepted {
+            if !view.emits.iter().any(|(known, _)| *known == event) {
+                view.emits.push((event, origin));
+            }
+        }
+        if exported.is_empty() {
+            continue;
+        }
+        let mut made = Configuration::new(ConfigId::from(subsystem.name));
+        let mut running = Vec::new();
+        for (component, ty) in exported {
+            let kind = ChangeKind::Create { component, ty: ty.name, activity: None, properties: BTreeMap::new() };
+            made.changes.push(Change { kind, origin: subsystem.origin });
+            let (target, state) = (Target::Component(component), Wanted::Running);
+            running.push(StateEntry { target, state, origin: subsystem.origin });
+            types.insert(ty);
+        }
+        made.post = StateList::of(running).unwrap_or_default();
+        made.origin = subsystem.origin;
+        view.configurations.push(made);
+    }
+    (view, types)
+}
+
+/// The events that a parent may raise, by their names there.
+pub fn accepted(subsystem: &Subsystem) -> BTreeSet<EventName> {
+    let own = &*subsystem.own;
+    let accepts = own.interface.accepts.iter().map(|(event, _)| *event);
+    accepts.chain([own.deploy.event, own.shutdown.event]).map(|event| event.within(subsystem.name)).collect()
+}
+
+/// The components that a subsystem exports something of, each with a type that has that and nothing else.
+fn exported(subsystem: &Subsystem, catalogue: &Catalogue) -> BTreeMap<ComponentName, ComponentType> {
+    let mut types: BTreeMap<ComponentName, ComponentType> = BTreeMap::new();
+    for export in subsystem.own.interface.exports.values() {
+        let component = export.of.component.within(subsystem.name);
+        let Some(whole) = created_as(&subsystem.own, export.of.component, catalogue, subsystem.name) else { continue };
+        let ty = types.entry(component).or_insert_with(|| {
+            let mut ty = ComponentType::new("davit.exported", &whole.doc);
+            ty.name = ty.name.of(component);
+            ty.actuator = false;
+            ty
+        });
+        match export.kind {
+            ExportKind::Port => ty.ports.extend(whole.ports.get_key_value(&export.of.member).map(own)),
+            ExportKind::Property => {
+                ty.properties.extend(whole.properties.get_key_value(&export.of.member).map(own).map(
+                    |(name, mut of)| {
+                        of.default = of.default.clone().or_else(|| Some(some_value(&of.ty)));
+                        (name, of)
+                    },
+                ));
+            }
+            ExportKind::Operation => {
+                ty.operations.extend(whole.operations.get_key_value(&export.of.member).map(own));
+            }
+        }
+    }
+    types
+}
+
+fn own<T: Clone>((name, of): (&Ident, &T)) -> (Ident, T) {
+    (*name, of.clone())
+}
+
+/// The type as which a file, or a subsystem of it, creates a component.
+fn created_as(
+    of: &Deployment,
+    component: ComponentName,
+    catalogue: &Catalogue,
+    path: Ident,
+) -> Option<Arc<ComponentType>> {
+    let changes = of.configurations.iter().flat_map(|configuration| &configuration.changes);
+    let ty = changes.filter_map(|change| change.kind.makes()).find(|(name, ..)| *name == component)?.1;
+    catalogue.get(ty).or_else(|| catalogue.get(ty.within(path))).cloned()
+}
+
+/// Any value of a type.
+fn some_value(ty: &ValueType) -> Value {
+    match ty {
+        ValueType::Bool | ValueType::Event => Value::Bool(false),
+        ValueType::Int => Value::Int(0),
+        ValueType::Float => Value::Float(0.0),
+        ValueType::Str => Value::str(""),
+        ValueType::Array(element, length) => {
+            Value::Array((0..length.unwrap_or_default()).map(|_| some_value(element)).collect())
+        }
+        ValueType::Record(fields) => Value::Record(fields.iter().map(|(name, ty)| (*name, some_value(ty))).collect()),
+    }
+}
+
+/// One report of all.
+fn put_together(whole: Arc<Deployment>, reports: Vec<(Option<Ident>, Report)>) -> Report {
+    let mut all: Vec<(Finding, Vec<super::TraceStep>)> = Vec::new();
+    let mut explored = Explored { complete: true, without_failure: true, ..Explored::default() };
+    let mut left: BTreeSet<String> = BTreeSet::new();
+    let (mut followed, mut replayed) = (true, true);
+    for (path, report) in reports {
+        followed &= report.verdict != CheckVerdict::Refused || report.replayed.is_some();
+        replayed &= report.replayed.is_some();
+        explored = explored.and(report.explored);
+        left.extend(report.left.into_iter().map(|bound| match path {
+            Some(path) => format!("`{path}`: {bound}"),
+            None => bound,
+        }));
+        let found = report.findings.into_iter().zip(report.traces);
+        all.extend(found.map(|(finding, trace)| (within(finding, path), trace)));
+    }
+    all.sort_by_key(|(finding, _)| std::cmp::Reverse(finding.severity));
+    let (findings, traces): (Vec<Finding>, Vec<_>) = all.into_iter().unzip();
+    let left: Vec<String> = left.into_iter().collect();
+    let verdict = CheckVerdict::of(&findings, followed, left.clone());
+    let checked = (verdict != CheckVerdict::Refused).then(|| Accepted::new(whole.clone()));
+    let replayed = replayed.then(|| Accepted::new(whole));
+    Report { checked, replayed, findings, traces, explored, left, verdict }
+}
+
+/// A finding of a subsystem's file, with the path that it has from here.
+fn within(finding: Finding, path: Option<Ident>) -> Finding {
+    let Some(path) = path else { return finding };
+    let told = match finding.path.strip_prefix("configurations.") {
+        Some(id) => format!("configurations.{path}/{id}"),
+        None if finding.path.is_empty() => String::new(),
+        None => format!("subsystems.{path}.{}", finding.path),
+    };
+    let mut finding = finding;
+    finding.path = told;
+    if !finding.origin.is_some() {
+        finding.message = format!("`{path}`: {}", finding.message);
+    }
+    finding
+}
