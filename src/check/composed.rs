@@ -49,7 +49,8 @@ fn parents_view(own: &Deployment, catalogue: &Catalogue) -> (Deployment, Catalog
         let exported = exported(subsystem, catalogue);
         let accepted = accepted(subsystem).into_iter().map(|event| (event, subsystem.origin));
         for (event, origin) in accepted {
-            if !view.emits.iter().any(|(known, _)| *known == event) {
+            let raises = own.charts().any(|chart| chart.raises(event.as_str()));
+            if raises && !view.emits.iter().any(|(known, _)| *known == event) {
                 view.emits.push((event, origin));
             }
         }
@@ -144,6 +145,7 @@ fn put_together(whole: Arc<Deployment>, reports: Vec<(Option<Ident>, Report)>) -
     let mut all: Vec<(Finding, Vec<super::TraceStep>)> = Vec::new();
     let mut explored = Explored { complete: true, without_failure: true, ..Explored::default() };
     let mut left: BTreeSet<String> = BTreeSet::new();
+    let mut told: Vec<(Finding, Option<String>)> = Vec::new();
     let (mut followed, mut replayed) = (true, true);
     for (path, report) in reports {
         followed &= report.verdict != CheckVerdict::Refused || report.replayed.is_some();
@@ -153,8 +155,19 @@ fn put_together(whole: Arc<Deployment>, reports: Vec<(Option<Ident>, Report)>) -
             Some(path) => format!("`{path}`: {bound}"),
             None => bound,
         }));
+        let file = |path: &Option<Ident>| path.and_then(|path| Some(whole.subsystem(path.as_str())?.file.clone()));
+        let own = file(&path);
+        // What is wrong in one file is told once, however often that is a subsystem.
+        let said = |finding: &Finding| {
+            let same = |(known, of): &(Finding, Option<String>)| {
+                own.is_some() && *of == own && (known.code, &known.message) == (finding.code, &finding.message)
+            };
+            told.iter().any(same)
+        };
         let found = report.findings.into_iter().zip(report.traces);
-        all.extend(found.map(|(finding, trace)| (within(finding, path), trace)));
+        let found: Vec<_> = found.filter(|(finding, _)| !said(finding)).collect();
+        told.extend(found.iter().map(|(finding, _)| (finding.clone(), own.clone())));
+        all.extend(found.into_iter().map(|(finding, trace)| (within(finding, path), trace)));
     }
     all.sort_by_key(|(finding, _)| std::cmp::Reverse(finding.severity));
     let (findings, traces): (Vec<Finding>, Vec<_>) = all.into_iter().unzip();

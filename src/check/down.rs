@@ -258,14 +258,20 @@ impl Graph<'_, '_> {
     }
 }
 
-/// What is left in a state in which all are down.
+/// What is left where it is *down*.
 fn left_in(product: &Product<'_>, state: &ProductState) -> Vec<ComponentName> {
-    let mut names = Vec::new();
-    if let Some(world) = product.worlds.get(state.world).filter(|_| product.is_down(state)) {
-        world.system.for_each_component(&mut |node| names.push(node.name));
-        // What is a subsystem's own is taken away by that.
-        names.retain(|name: &ComponentName| product.children.iter().all(|child| name.local(child.path).is_none()));
+    if product.is_down(state) { product.there(state) } else { Vec::new() }
+}
+
+impl Product<'_> {
+    /// The components that are there, as far as that is known, without what is a subsystem's own: that takes it away.
+    pub(super) fn there(&self, state: &ProductState) -> Vec<ComponentName> {
+        let mut names = Vec::new();
+        if let Some(world) = self.worlds.get(state.world) {
+            world.system.for_each_component(&mut |node| names.push(node.name));
+        }
+        names.retain(|name: &ComponentName| self.children.iter().all(|child| name.local(child.path).is_none()));
+        names.sort_unstable();
+        names
     }
-    names.sort_unstable();
-    names
 }

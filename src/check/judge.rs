@@ -453,7 +453,7 @@ impl Graph<'_, '_> {
 }
 
 /// How bad it is at most that something is refused where this failed before.
-fn severity_of(failed: Failed) -> Severity {
+pub(super) fn severity_of(failed: Failed) -> Severity {
     match failed {
         Failed::Nothing => Severity::Error,
         Failed::Apply => Severity::Warning,

@@ -4,7 +4,7 @@
 
 use super::coordinator::ask_of;
 use super::explore::Graph;
-use super::judge::Traced;
+use super::judge::{Traced, severity_of};
 use super::product::Product;
 use super::state::{Failed, Move, ProductState};
 use crate::model::codes::{COMPOSE_PROMISE, COMPOSE_UNLEFT};
@@ -24,6 +24,7 @@ pub struct Child {
     begins: EventName,
     /// From this one on what it exports is there.
     from: EventName,
+    up: EventName,
     /// Until the parent raises this one.
     until: EventName,
     down: EventName,
@@ -46,7 +47,7 @@ impl Child {
             };
             let touching = deployment.configurations.iter().filter(touches).map(|c| c.id).collect();
             let (begins, down) = (own.deploy.event.within(path), Standing::Down.event(path));
-            Self { path, begins, from, until, down, touching }
+            Self { path, begins, from, up: Standing::Up.event(path), until, down, touching }
         };
         deployment.subsystems.iter().take(MOST_CHILDREN).map(of).collect()
     }
@@ -68,7 +69,7 @@ impl Product<'_> {
         }
         let Some(name) = self.members[number].name_of(event) else { return };
         for (at, child) in self.children.iter().enumerate() {
-            if name == child.from {
+            if name == child.from || name == child.up {
                 state.children |= promised(at);
             } else if name == child.down {
                 state.children &= !(promised(at) | begun(at));
@@ -153,7 +154,9 @@ impl Graph<'_, '_> {
                 of.from, of.until
             );
             let place = self.product.worlds.configuration(id).map(|c| c.origin).unwrap_or_default();
-            let finding = Finding::error(COMPOSE_PROMISE, message).at(place).path(format!("configurations.{id}"));
+            let severity = severity_of(self.failed[at as usize]);
+            let finding =
+                Finding::new(severity, COMPOSE_PROMISE, message).at(place).path(format!("configurations.{id}"));
             let trace = self.trace(at);
             found.push((finding.help(help), trace));
         }
@@ -237,17 +240,11 @@ impl Graph<'_, '_> {
                 }
             }
         }
-        let says = |graph: &Self, before: u32, after: u32| match from {
-            Some(_) => {
-                let (before, after) = (&graph.states[before as usize], &graph.states[after as usize]);
-                emits.iter().any(|(number, pairs)| {
-                    pairs.contains(&(before.leaves[*number].index(), after.leaves[*number].index()))
-                })
-            }
-            None => {
-                let state = &graph.states[after as usize];
-                state.is_at_rest() && graph.product.all_in(state, |member| member.up)
-            }
+        let says = |graph: &Self, before: u32, after: u32| {
+            let (before, after) = (&graph.states[before as usize], &graph.states[after as usize]);
+            let pair = |number: usize| (before.leaves[number].index(), after.leaves[number].index());
+            emits.iter().any(|(number, pairs)| pairs.contains(&pair(*number)))
+                || after.is_at_rest() && graph.product.all_in(after, |member| member.up)
         };
         let ends = |graph: &Self, by: Move| match by {
             Move::Event(at) => graph.product.outside[usize::from(at)] == until,

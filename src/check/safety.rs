@@ -28,6 +28,11 @@ fn near(deployment: &Deployment, charts: &[&Chart], event: EventName) -> Option<
     if charts.iter().any(|chart| !chart.is_pure() || chart.events().contains(&event)) {
         return None;
     }
+    // It is given on to the subsystems that have one of that name.
+    let declares = |own: &Deployment| own.safety.iter().any(|(declared, _)| *declared == event);
+    if deployment.all_subsystems().iter().any(|(_, subsystem)| declares(&subsystem.own)) {
+        return None;
+    }
     let heard: BTreeSet<EventName> = charts.iter().flat_map(|chart| outside_events(deployment, chart)).collect();
     Some(did_you_mean(event.as_str(), "events", heard.iter().map(EventName::as_str)))
 }

@@ -181,9 +181,7 @@ fn waits_at(product: &Product<'_>, timer: Timer) -> Origin {
 }
 
 fn leftovers(product: &Product<'_>, end: &ProductState) -> Option<Finding> {
-    let mut left = Vec::new();
-    product.worlds.get(end.world)?.system.for_each_component(&mut |node| left.push(node.name.to_string()));
-    left.sort();
+    let mut left: Vec<String> = product.there(end).iter().map(ToString::to_string).collect();
     if left.is_empty() {
         return None;
     }

@@ -254,7 +254,9 @@ impl Deployment {
     /// of components and monitors always are: nobody asks them to be silent.
     pub fn stays_open(&self, event: &str) -> bool {
         let safety = || self.safety.is_empty() || self.safety.iter().any(|(safety, _)| safety.as_str() == event);
-        self.shutdown.event.as_str() == event || self.deploy.event.as_str() != event && safety()
+        // Its parent lets it go, or, where it has none, nobody has to.
+        let until = self.interface.leaving.is_some_and(|leaving| leaving.until.as_str() == event);
+        until || self.shutdown.event.as_str() == event || self.deploy.event.as_str() != event && safety()
     }
 
     /// Events that go before all others, whoever raises them: those of safety, and those that begin and end the deployment. Of

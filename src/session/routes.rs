@@ -34,6 +34,8 @@ pub(super) struct Junction {
     ends: Option<(EventName, EventName)>,
     /// Its subsystems.
     pub subsystems: Option<Arc<Subsystems>>,
+    /// What it says before it leaves, and what it waits for then: it has no parent that would let it go.
+    leaving: Option<(EventName, EventName)>,
     /// Nobody drives it any more.
     closed: AtomicBool,
     /// Held while an event is given to several coordinators: what one of them tells the others of it comes behind it everywhere.
@@ -45,7 +47,8 @@ impl Junction {
     pub fn new(deployment: &Deployment, subsystems: Arc<Subsystems>) -> Self {
         let urgent = deployment.urgent().map(|event| (event, deployment.precedence(event))).collect();
         let ends = Some((deployment.deploy.event, deployment.shutdown.event));
-        Self { urgent, ends, subsystems: Some(subsystems), ..Self::default() }
+        let leaving = deployment.interface.leaving.map(|leaving| (leaving.says, leaving.until));
+        Self { urgent, ends, subsystems: Some(subsystems), leaving, ..Self::default() }
     }
 
     /// Its subsystems, if it has any.
@@ -316,6 +319,9 @@ impl ToConfigurator {
         let Some(junction) = self.junction.upgrade() else { return };
         if self.hub.is_stopping() && junction.begins(event) {
             return;
+        }
+        if let Some((_, until)) = junction.leaving.filter(|(says, _)| *says == event) {
+            junction.give_all(&self.hub, Class::Report, until);
         }
         let others: Vec<CoordinatorHandle> = lock(&junction.coordinators)
             .iter()
