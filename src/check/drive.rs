@@ -303,7 +303,7 @@ pub(super) fn ways(product: &mut Product<'_>) -> Option<(Way, Option<Way>)> {
     let ready = moves.last().map_or(&start, |next| &next.state).clone();
     let (deploy, shutdown) = (deployment.deploy.event, deployment.shutdown.event);
     let tried = Tried { first: deploy, never: shutdown, stopping: false, within: deployment.deploy.within };
-    let mut rise = way(product, ready, &tried, |member| member.up);
+    let mut rise = way(product, ready, &tried, |member| member.goal_up());
     // From the start, not from where it was ready.
     moves.append(&mut rise.moves);
     let rise = Way { from: start, moves, ..rise };
@@ -334,7 +334,7 @@ pub fn drive(deployment: &Deployment, catalogue: &Catalogue, until: Until) -> Op
     };
     let reached = end.reached && (until == Until::Up || fall.is_some());
     let world = product.worlds.get(end.end().world)?;
-    let goal: Goal = if until == Until::Up { |member| member.up } else { |member| member.down };
+    let goal: Goal = if until == Until::Up { |member| member.goal_up() } else { |member| member.down };
     let mut last = product.members.iter().zip(&end.end().leaves).collect::<Vec<_>>().into_iter();
     let inside =
         |(member, leaf): &(&Member<'_>, &NodeId)| goal(member).is_some_and(|goal| member.chart.is_inside(**leaf, goal));

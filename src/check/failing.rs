@@ -18,7 +18,7 @@ impl Graph<'_, '_> {
         // What operators ask for there is asked for later.
         let waits = |at: u32| self.product.members.iter().any(|member| state(at).outstanding(member.by) > 0);
         let heard = |at: u32| state(at).inbox.is_empty() && state(at).in_transit.is_empty();
-        let is_up = |at: u32| heard(at) && !waits(at) && self.product.all_in(state(at), |member| member.up);
+        let is_up = |at: u32| heard(at) && !waits(at) && self.product.all_in(state(at), |member| member.goal_up());
         let failed = |at: u32| self.product.failed_in(state(at)).is_some();
         // From the first of them on it is being stopped.
         let leads = |_: usize, edge: &Edge| !is_up(edge.from) && !failed(edge.from) && !state(edge.to).stopping;

@@ -14,6 +14,8 @@ use std::rc::Rc;
 pub struct Member<'a> {
     /// Its name.
     pub name: Ident,
+    /// The subsystem that it is one of, where all of a deployment is followed as one.
+    pub of: Option<Ident>,
     /// Its chart.
     pub chart: &'a Chart,
     /// Its state that means up.
@@ -32,6 +34,11 @@ impl<'a> Member<'a> {
     /// From now on it hears these events from outside.
     pub fn listen(&mut self, deployment: &'a Deployment, outside: &[EventName]) {
         self.reactions = Some(Reactions::new(deployment, self.chart, outside, self.down));
+    }
+
+    /// Where it is to come for the deployment to be up: one of a subsystem may be anywhere, its parent decides.
+    pub fn goal_up(&self) -> Option<NodeId> {
+        if self.of.is_some() { Some(NodeId::ROOT) } else { self.up }
     }
 
     fn reactions(&mut self) -> &mut Reactions<'a> {
@@ -109,6 +116,7 @@ pub fn members<'a>(deployment: &Deployment, charts: &[&'a Chart], numbers: &[usi
         }
         members.push(Member {
             name: coordinator.name,
+            of: coordinator.of,
             chart,
             up: chart.find(&coordinator.up).ok(),
             down: chart.find(&coordinator.down).ok(),

@@ -61,6 +61,7 @@ mod shared_list;
 mod shown;
 mod shows;
 mod simulated;
+mod standings;
 mod stands;
 mod state;
 mod timers;

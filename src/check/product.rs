@@ -19,6 +19,7 @@ use super::outcome::{Comes, ConcurrentWork, EMPTY, Held, Went, WorldId};
 use super::promises::Child;
 use super::reactions::Asked;
 use super::shared_list::{Shared, SharedList};
+use super::standings::Watched;
 use super::state::{Failed, Move, Next, Nexts, ProductState, Reacts, bit, index, one};
 use super::world::Worlds;
 use crate::limits;
@@ -92,6 +93,8 @@ pub struct Product<'a> {
     pub(super) aside: Aside,
     /// The subsystems of the deployment, as its coordinators know them.
     pub(super) children: Vec<Child>,
+    /// The same where their coordinators are among these.
+    pub(super) watched: Vec<Watched>,
     /// How much more is followed.
     pub(super) effort: Left<'a>,
     /// What is known of reactions to steps.
@@ -147,13 +150,16 @@ impl<'a> Product<'a> {
             crosses: false,
             by_hand: 1,
             aside: Aside::default(),
-            children: Child::all(deployment),
+            children: if deployment.own.is_none() { Child::all(deployment) } else { Vec::new() },
+            watched: Vec::new(),
             effort: Effort::default().into(),
             reacts: FxHashMap::default(),
             spare: Vec::new(),
         };
         (product.worlds.judged, product.unjudged) = super::stands::judged(deployment, charts);
         product.aside = Aside::of(deployment, &product.members, &product.losable);
+        let names: Vec<_> = product.members.iter().map(|member| (member.name, member.of)).collect();
+        product.watched = Watched::all(deployment, &names);
         product.alike = product.alike_events();
         for (place, number) in numbers.iter().enumerate() {
             let own = outside_of(deployment, &views[*number], charts[*number]);
@@ -304,6 +310,7 @@ impl<'a> Product<'a> {
     /// What batches and safe configurations that stopped at last come to is decided in `ends`; this settles what needs no
     /// decision: who comes to *down*, and when the deployment is down.
     pub(super) fn settle(&mut self, mut state: ProductState) -> ProductState {
+        self.tell_standings(&mut state);
         // Where others are still to come down, the deployment is being stopped until they have.
         state.stopping &= self.waits_for_others() || !(state.is_at_rest() && self.all_in(&state, |member| member.down));
         state.elsewhere &= state.stopping;

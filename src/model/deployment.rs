@@ -299,7 +299,9 @@ impl Deployment {
     /// Why an event cannot come from outside (of a component, a monitor, an operator): it tells what only Davit knows, or what only
     /// its coordinators tell each other. None: it can.
     pub fn never_from_outside(&self, event: &str) -> Option<String> {
-        if is_internal(event) {
+        if self.own.is_some() && self.is_told_of(event) {
+            Some(format!("`{event}` is told of a subsystem by itself, and nobody else raises it"))
+        } else if is_internal(event) {
             Some(format!("`{event}` is an event of the statechart itself, which nobody else raises"))
         } else if !self.looks_like_answer(event) {
             let told = || format!("`{event}` is what coordinators tell each other, which nobody else raises");

@@ -187,6 +187,13 @@ impl Deployment {
         None
     }
 
+    /// Whether an event is one that is told of a subsystem without anybody raising it.
+    pub fn is_told_of(&self, event: &str) -> bool {
+        let Some((path, word)) = event.rsplit_once('/') else { return false };
+        self.subsystem(path).is_some()
+            && (word.ends_with(IGNORED) || Standing::ALL.iter().any(|standing| standing.word() == word))
+    }
+
     /// What is written in its own file alone: with subsystems the rest of it is made of theirs.
     pub fn own_part(&self) -> &Self {
         self.own.as_deref().unwrap_or(self)

@@ -165,6 +165,8 @@ impl Session {
     pub fn events(&self) -> Vec<EventName> {
         let mut events: Vec<EventName> = self.parts.iter().flat_map(|part| part.chart.events()).copied().collect();
         events.extend(self.deployment.configurations.iter().filter_map(|c| c.confirm.map(|confirm| confirm.event)));
+        // Those that are only given on to subsystems.
+        events.extend(self.deployment.safety.iter().map(|(event, _)| *event));
         events.sort_unstable();
         events.dedup();
         events

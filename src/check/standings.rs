@@ -1,0 +1,63 @@
+//! What is told of subsystems by itself where all of a deployment is followed as one: the ways up and down of `davit plan`, and the plain
+//! product that tests hold against what is found file by file.
+
+use super::product::Product;
+use super::state::ProductState;
+use crate::model::subsystem::{Seen, standing};
+use crate::model::{Deployment, Ident, Standing};
+
+/// A subsystem with the numbers of its coordinators.
+#[derive(Debug, Clone)]
+pub struct Watched {
+    path: Ident,
+    members: Vec<usize>,
+}
+
+/// Of so many subsystems it is known what was told of them.
+const MOST: usize = 32;
+
+impl Watched {
+    /// The subsystems of a deployment that is put together, by the coordinators of these names.
+    pub fn all(deployment: &Deployment, names: &[(Ident, Option<Ident>)]) -> Vec<Self> {
+        if deployment.own.is_none() {
+            return Vec::new();
+        }
+        let of = |path: Ident| (0..names.len()).filter(|number| names[*number].1 == Some(path)).collect::<Vec<_>>();
+        let all = deployment.all_subsystems().into_iter().map(|(path, _)| Self { path, members: of(path) });
+        all.filter(|watched| !watched.members.is_empty()).take(MOST).collect()
+    }
+}
+
+impl Product<'_> {
+    /// Tells of what subsystems have come to.
+    pub(super) fn tell_standings(&mut self, state: &mut ProductState) {
+        for at in 0..self.watched.len() {
+            let told = match state.children >> (2 * at) & 3 {
+                0 => None,
+                number => Some(Standing::ALL[number as usize - 1]),
+            };
+            let seen = self.seen_standing(state, at);
+            let Some(now) = standing(told, seen) else { continue };
+            let number = Standing::ALL.iter().position(|standing| *standing == now).unwrap_or_default() as u64 + 1;
+            state.children = state.children & !(3 << (2 * at)) | number << (2 * at);
+            self.spread(state, now.event(self.watched[at].path), None);
+        }
+    }
+
+    fn seen_standing(&self, state: &ProductState, at: usize) -> Seen {
+        let mut seen = Seen { up: true, down: true, ..Seen::default() };
+        for number in &self.watched[at].members {
+            let (member, leaf) = (&self.members[*number], state.leaves[*number]);
+            let inside = |node| member.chart.is_inside(leaf, node);
+            let settled = state.outstanding(member.by) == 0
+                && state.inbox.iter().all(|(to, _)| usize::from(*to) != *number)
+                && state.telling.iter().all(|(request, _)| request.requester != member.by);
+            seen.up &= settled && member.up.is_some_and(inside);
+            seen.down &= settled && member.down.is_some_and(inside);
+            seen.failed |= member.failed.iter().any(|failed| inside(*failed));
+        }
+        let path = self.watched[at].path;
+        seen.down &= self.there(state).iter().all(|component| component.local(path).is_none());
+        seen
+    }
+}
