@@ -93,8 +93,7 @@ impl Product<'_> {
         let reacts = simulated && deployment.reactions.iter().any(|reaction| reaction.raise == name);
         let watched = || deployment.monitors.iter().flat_map(Monitor::events).any(|event| event == name);
         // What a subsystem tells nobody can refuse.
-        let told = self.children.iter().any(|child| name.local(child.path).is_some());
-        if told || deployment.stays_open(name.as_str()) {
+        if self.is_told_by_child(name) || deployment.stays_open(name.as_str()) {
             Raises::Somebody
         } else if reacts || fails(name) || watched() {
             Raises::Sometimes

@@ -5,6 +5,7 @@
 //! are the components that they export, which are there while that is promised ([`promises`](super::promises) holds both to it).
 
 use super::report::{Accepted, Explored, Report};
+use super::trace::{Does, TraceStep};
 use super::verdict::CheckVerdict;
 use crate::model::subsystem::ExportKind;
 use crate::model::{
@@ -142,7 +143,7 @@ fn some_value(ty: &ValueType) -> Value {
 
 /// One report of all.
 fn put_together(whole: Arc<Deployment>, reports: Vec<(Option<Ident>, Report)>) -> Report {
-    let mut all: Vec<(Finding, Vec<super::TraceStep>)> = Vec::new();
+    let mut all: Vec<(Finding, Vec<TraceStep>)> = Vec::new();
     let mut explored = Explored { complete: true, without_failure: true, ..Explored::default() };
     let mut left: BTreeSet<String> = BTreeSet::new();
     let mut told: Vec<(Finding, Option<String>)> = Vec::new();
@@ -167,7 +168,7 @@ fn put_together(whole: Arc<Deployment>, reports: Vec<(Option<Ident>, Report)>) -
         let found = report.findings.into_iter().zip(report.traces);
         let found: Vec<_> = found.filter(|(finding, _)| !said(finding)).collect();
         told.extend(found.iter().map(|(finding, _)| (finding.clone(), own.clone())));
-        all.extend(found.into_iter().map(|(finding, trace)| (within(finding, path), trace)));
+        all.extend(found.into_iter().map(|(finding, way)| (within(finding, path), alone(way, path))));
     }
     all.sort_by_key(|(finding, _)| std::cmp::Reverse(finding.severity));
     let (findings, traces): (Vec<Finding>, Vec<_>) = all.into_iter().unzip();
@@ -176,6 +177,15 @@ fn put_together(whole: Arc<Deployment>, reports: Vec<(Option<Ident>, Report)>) -
     let checked = (verdict != CheckVerdict::Refused).then(|| Accepted::new(whole.clone()));
     let replayed = replayed.then(|| Accepted::new(whole));
     Report { checked, replayed, findings, traces, explored, left, verdict }
+}
+
+/// The way to a finding of a subsystem's file: it is gone where that is deployed alone.
+fn alone(mut way: Vec<TraceStep>, path: Option<Ident>) -> Vec<TraceStep> {
+    if path.is_some() {
+        way.iter_mut()
+            .for_each(|step| step.replay.does = Does::Cannot("it is one of a subsystem's file: check that file alone"));
+    }
+    way
 }
 
 /// A finding of a subsystem's file, with the path that it has from here.

@@ -28,7 +28,8 @@ pub struct Effort<'e> {
     /// What failed undos leave is known one at a time where so many configurations may be left, at least ([`undo_failed`](super::undo_failed)); where
     /// they are fewer, following every subset of them is less.
     pub aside_from: usize,
-    /// Coordinators that have nothing to do with each other are followed together all the same.
+    /// Coordinators that have nothing to do with each other are followed together all the same, and so are all files of a deployment with
+    /// subsystems.
     pub together: bool,
     /// Told every few thousand states how far it is; an error ends it there, and what was left out is said.
     pub goes_on: &'e dyn Fn(Far) -> Result<(), Halt>,

@@ -96,6 +96,11 @@ impl Product<'_> {
         children.any(|(at, child)| told(child) && state.children & begun(at) == 0)
     }
 
+    /// Whether a subsystem tells an event.
+    pub(super) fn is_told_by_child(&self, name: EventName) -> bool {
+        self.children.iter().any(|child| name.local(child.path).is_some())
+    }
+
     /// Whether every subsystem is known to be down.
     pub(super) fn children_down(&self, state: &ProductState) -> bool {
         (0..self.children.len()).all(|at| state.children & begun(at) == 0)

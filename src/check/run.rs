@@ -28,7 +28,8 @@ pub fn run(deployment: impl Into<Arc<Deployment>>, catalogue: &Catalogue) -> Rep
 
 /// The same with more effort, or less.
 pub fn run_with(deployment: impl Into<Arc<Deployment>>, catalogue: &Catalogue, effort: Effort<'_>) -> Report {
-    composed::run(deployment.into(), catalogue, &|own, catalogue| run_one(own, catalogue, effort))
+    let one = |own, catalogue: &Catalogue| run_one(own, catalogue, effort);
+    if effort.together { one(deployment.into(), catalogue) } else { composed::run(deployment.into(), catalogue, &one) }
 }
 
 /// The check of one file.

@@ -60,6 +60,10 @@ pub const FOLLOWED: &[Code] = &[
 /// Found without following anything, and why no way leads there.
 pub const READ: &[(&str, &[Code])] = &[
     (
+        "it is about one file of several, and what comes from the others there is brought about by no script",
+        &[COMPOSE_PROMISE, COMPOSE_UNLEFT, COMPOSE_UNKNOWN, COMPOSE_SAFETY, COMPOSE_WORD, COMPOSE_EXPORT_DRIVEN],
+    ),
+    (
         "it is told of what the deployment says, wherever that is used: no way leads to it",
         &[
             UNKNOWN_TYPE,

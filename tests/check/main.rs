@@ -13,6 +13,7 @@ mod aside;
 mod asked;
 mod beside;
 mod circles;
+mod composed;
 mod demands;
 mod follow;
 mod product;

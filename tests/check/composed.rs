@@ -1,0 +1,390 @@
+//! Deployments with subsystems: what each file is held to, and that what is found file by file holds of all together.
+
+use davit::check::{self, Effort};
+use davit::lang::{self, LoadOptions, Sources};
+use davit::libraries::monitors;
+use davit::model::{Catalogue, Deployment, Finding, Severity};
+use davit::runtime::Libraries;
+use std::path::Path;
+
+const ARM: &str = "davit: 1
+name: arm
+platform: simulated
+types:
+  Drive:
+    ports: { pose: { direction: out, type: float }, ref: { direction: in, type: float } }
+    properties: { k: { type: float, default: 1.0 } }
+    operations: { brake: { effect: none } }
+parameters: { gain: { type: float, default: 0.5, min: 0.0, max: 2.0 } }
+exports:
+  ports: { pose: D.pose, ref: D.ref }
+  properties: { k: D.k }
+  from: e_built
+accepts: [e_released]
+emits: [e_built, e_leaving]
+leaving: { says: e_leaving, until: e_released }
+configurations: [arm_conf.lua]
+coordinator: arm.lua
+deploy: { event: e_start, up: on, within_s: 5 }
+shutdown: { event: e_shutdown, down: idle, within_s: 5 }
+";
+const ARM_CONF: &str = "ConfiguratorConf {
+  make = Configuration { create('D', 'Drive'), property_set('D.k', gain), post_conf_state = { 'D:stopped' } },
+  run = Configuration { post_conf_state = { 'D:running' } },
+}";
+const ARM_COORDINATOR: &str = "return state {
+  idle = state {}, making = state { entry = 'make' }, starting = state { entry = { 'e_built', 'run' } }, on = state {},
+  leaving = state { entry = 'e_leaving' }, stopping = state { entry = 'run.undo' }, unmaking = state { entry = 'make.undo' },
+  trans { src = 'initial', tgt = 'idle' },
+  trans { src = 'idle', tgt = 'making', events = { 'e_start' } },
+  trans { src = 'making', tgt = 'starting', events = { 'make.ok' } },
+  trans { src = 'making', tgt = 'unmaking', events = { 'make.failed', 'make.broken', 'e_shutdown' } },
+  trans { src = 'starting', tgt = 'on', events = { 'run.ok' } },
+  trans { src = 'starting', tgt = 'leaving', events = { 'run.failed', 'run.broken', 'e_shutdown' } },
+  trans { src = 'on', tgt = 'leaving', events = { 'e_shutdown' } },
+  trans { src = 'leaving', tgt = 'stopping', events = { 'e_released' } },
+  trans { src = 'stopping', tgt = 'unmaking', events = { 'run.undone', 'run.undo.failed', 'run.undo.broken' } },
+  trans { src = 'unmaking', tgt = 'idle', events = { 'make.undone', 'make.undo.failed', 'make.undo.broken' } },
+}";
+const PAIR: &str = "davit: 1
+name: pair
+platform: simulated
+types: {}
+subsystems:
+  left: { deployment: arm.yaml, parameters: { gain: 0.7 } }
+  right: { deployment: arm.yaml }
+configurations: [pair_conf.lua]
+coordinator: pair.lua
+deploy: { event: e_start, up: coupled, within_s: 10 }
+shutdown: { event: e_shutdown, down: idle, within_s: 10 }
+";
+const PAIR_CONF: &str = "ConfiguratorConf {
+  couple = Configuration { connect('left.pose', 'right.ref'), connect('right.pose', 'left.ref') },
+  stiff = Configuration { property_set('left.k', 2.0) },
+}";
+const PAIR_COORDINATOR: &str = "return state {
+  idle = state {},
+  alive = state {
+    raising = state { entry = { 'left/e_start', 'right/e_start' } }, one = state {}, two = state {},
+    coupling = state { entry = 'couple' }, coupled = state {},
+    trans { src = 'initial', tgt = 'raising' },
+    trans { src = 'raising', tgt = 'one', events = { 'left/up' } },
+    trans { src = 'raising', tgt = 'two', events = { 'right/up' } },
+    trans { src = 'one', tgt = 'coupling', events = { 'right/up' } },
+    trans { src = 'two', tgt = 'coupling', events = { 'left/up' } },
+    trans { src = 'coupling', tgt = 'coupled', events = { 'couple.ok' } },
+  },
+  parting = state { entry = 'couple.undo' },
+  lowering = state { entry = { 'left/e_shutdown', 'right/e_shutdown', 'left/e_released', 'right/e_released' } },
+  lone = state {}, ltwo = state {},
+  trans { src = 'initial', tgt = 'idle' },
+  trans { src = 'idle', tgt = 'alive', events = { 'e_start' } },
+  trans { src = 'alive', tgt = 'parting',
+          events = { 'e_shutdown', 'left/e_leaving', 'right/e_leaving', 'couple.failed', 'couple.broken' } },
+  trans { src = 'parting', tgt = 'lowering', events = { 'couple.undone', 'couple.undo.failed', 'couple.undo.broken' } },
+  trans { src = 'lowering', tgt = 'lone', events = { 'left/down' } },
+  trans { src = 'lowering', tgt = 'ltwo', events = { 'right/down' } },
+  trans { src = 'lone', tgt = 'idle', events = { 'right/down' } },
+  trans { src = 'ltwo', tgt = 'idle', events = { 'left/down' } },
+}";
+
+/// The files of the pair, some of them changed: `(file, what stands there, what is to stand there)`.
+fn files(changes: &[(&str, &str, &str)]) -> Sources {
+    let mut files = [
+        ("arm.yaml", ARM.to_owned()),
+        ("arm_conf.lua", ARM_CONF.to_owned()),
+        ("arm.lua", ARM_COORDINATOR.to_owned()),
+        ("pair.yaml", PAIR.to_owned()),
+        ("pair_conf.lua", PAIR_CONF.to_owned()),
+        ("pair.lua", PAIR_COORDINATOR.to_owned()),
+    ];
+    for (file, before, after) in changes {
+        let text = &mut files.iter_mut().find(|(name, _)| name == file).expect("a file of the pair").1;
+        assert!(text.contains(before), "{file} has no `{before}`");
+        *text = text.replacen(before, after, 1);
+    }
+    Sources::memory(files)
+}
+
+fn load(sources: &Sources, file: &str, set: &[(&str, &str)]) -> lang::Loaded {
+    let set = set.iter().map(|(name, value)| ((*name).to_owned(), (*value).to_owned())).collect();
+    lang::load_from(sources, Path::new(file), &LoadOptions { set, ..LoadOptions::default() })
+}
+
+fn catalogue(deployment: &Deployment) -> Catalogue {
+    let mut catalogue = monitors::added_to(Libraries::default(), &deployment.monitors).catalogue();
+    deployment.types.iter().for_each(|ty| _ = catalogue.insert(ty.clone()));
+    catalogue
+}
+
+/// What reading finds, or, where it finds nothing, what `check` finds.
+fn found(changes: &[(&str, &str, &str)]) -> Vec<Finding> {
+    let loaded = load(&files(changes), "pair.yaml", &[]);
+    match loaded.deployment {
+        Some(deployment) if loaded.findings.is_empty() => {
+            let catalogue = catalogue(&deployment);
+            check::run(deployment, &catalogue).findings
+        }
+        _ => loaded.findings,
+    }
+}
+
+/// The one finding of that code: what it says, and what it says to do.
+fn one(changes: &[(&str, &str, &str)], code: &str) -> (String, String) {
+    let found = found(changes);
+    let of: Vec<&Finding> =
+        found.iter().filter(|finding| finding.code.0 == code && finding.severity > Severity::Info).collect();
+    let [one] = &of[..] else { panic!("{code}: {found:#?}") };
+    (one.message.clone(), one.help.clone().unwrap_or_default())
+}
+
+#[test]
+fn each_file_is_followed_alone_and_their_product_never() {
+    let whole = load(&files(&[]), "pair.yaml", &[]).deployment.unwrap();
+    let together = check::run(whole.clone(), &catalogue(&whole));
+    let errors: Vec<&Finding> = together.findings.iter().filter(|finding| finding.is_error()).collect();
+    assert!(errors.is_empty(), "{errors:#?}");
+    assert!(together.checked.is_some());
+    let arm = load(&files(&[]), "arm.yaml", &[]).deployment.unwrap();
+    let alone = check::run(arm.clone(), &catalogue(&arm)).explored;
+    let parents = together.explored.states - 2 * alone.states;
+    assert!(alone.states > 20 && parents > 20, "{alone:?} {:?}", together.explored);
+    let effort = Effort { together: true, transitions: 30_000, ..Effort::default() };
+    let product = check::run_with(whole.clone(), &catalogue(&whole), effort).explored;
+    assert!(!product.complete && product.states > 5 * together.explored.states, "{product:?} {:?}", together.explored);
+    // What is wrong in a file that is there twice is told once.
+    let told = |code: &str| together.findings.iter().filter(|finding| finding.code.0 == code).count();
+    let in_arm = check::run(arm.clone(), &catalogue(&arm)).findings;
+    let unhandled = in_arm.iter().filter(|finding| finding.code.0 == "coord::failure_unhandled").count();
+    assert!(told("coord::failure_unhandled") <= unhandled + 2, "{:#?}", together.findings);
+}
+
+#[test]
+fn a_parent_touches_what_is_exported_and_nothing_else() {
+    let pose = "connect('left.pose', 'right.ref')";
+    let (says, help) = one(&[("pair_conf.lua", pose, "connect('left/D.pose', 'right.ref')")], "compose::not_exported");
+    assert!(says.starts_with("`left/D.pose` is in `left`") && help == "write `left.pose`", "{says}: {help}");
+    let inner = [("arm.yaml", "pose: D.pose, ", ""), ("pair_conf.lua", pose, "connect('left/D.pose', 'right.ref')")];
+    let others = found(&inner);
+    let help: Vec<&str> = others.iter().filter_map(|finding| finding.help.as_deref()).collect();
+    assert!(help.iter().any(|help| help.contains("`exports: { ports: { pose: D.pose } }`")), "{others:#?}");
+    let (says, help) = one(&[("pair_conf.lua", pose, "connect('left.pase', 'right.ref')")], "compose::not_exported");
+    assert_eq!((says.as_str(), help.as_str()), ("`left` exports nothing called `pase`", "did you mean `pose`?"));
+    let (says, _) = one(
+        &[("pair_conf.lua", "property_set('left.k', 2.0)", "property_set('left.ref', 2.0)")],
+        "compose::not_exported",
+    );
+    assert_eq!(says, "`left.ref` is exported under `ports`, and not under `properties`");
+    for wrong in ["destroy('left/D')", "create('left', 'Drive')", "pre_conf_state = { 'left/D:stopped' }"] {
+        let (says, help) = one(&[("pair_conf.lua", "property_set('left.k', 2.0)", wrong)], "compose::not_own");
+        assert!(says.contains("subsystem") && help.contains("`left/e_start`"), "{says}: {help}");
+    }
+    let own = ("pair_conf.lua", "couple = Configuration {", "['left/couple'] = Configuration {");
+    assert!(one(&[own], "compose::name_taken").0.contains("`left/couple`"));
+    // Types and directions are those of the inner thing.
+    let (says, _) = one(&[("pair_conf.lua", pose, "connect('left.ref', 'right.ref')")], "conf::not_an_out_port");
+    assert!(says.contains("left/D.ref"), "{says}");
+    let (says, _) =
+        one(&[("pair_conf.lua", "property_set('left.k', 2.0)", "property_set('left.k', true)")], "conf::bad_value");
+    assert!(says.contains("left/D.k"), "{says}");
+}
+
+#[test]
+fn a_parent_asks_for_what_touches_an_export_only_while_it_is_there() {
+    // At once, and not when both are up.
+    let early = [(
+        "pair.lua",
+        "raising = state { entry = { 'left/e_start', 'right/e_start' } }",
+        "raising = state { entry = { 'left/e_start', 'right/e_start', 'stiff' } }",
+    )];
+    let (says, help) = one(&early, "compose::promise");
+    assert_eq!(says, "`stiff` is asked for where what `left` exports need not be there");
+    assert!(help.contains("`left/e_built`") && help.contains("`left/e_released`"), "{help}");
+    // Let go, and the frame is still there.
+    let late = [(
+        "pair.lua",
+        "parting = state { entry = 'couple.undo' }",
+        "parting = state { entry = { 'left/e_released', 'couple.undo' } }",
+    )];
+    let found = found(&late);
+    let held = found.iter().find(|finding| finding.code.0 == "compose::promise" && finding.is_error());
+    assert!(held.is_some_and(|finding| finding.message.contains("`couple`")), "{found:#?}");
+    // Without the event being waited for.
+    let blind = [(
+        "pair.lua",
+        "trans { src = 'raising', tgt = 'one', events = { 'left/up' } }",
+        "trans { src = 'raising', tgt = 'one', events = { 'left/e_start.ignored' } }",
+    )];
+    assert!(one(&blind, "compose::promise").0.contains("`left`"));
+}
+
+#[test]
+fn a_subsystem_takes_nothing_away_before_it_is_let_go() {
+    let hasty = [(
+        "arm.lua",
+        "trans { src = 'on', tgt = 'leaving', events = { 'e_shutdown' } }",
+        "trans { src = 'on', tgt = 'stopping', events = { 'e_shutdown' } }",
+    )];
+    let (says, help) = one(&hasty, "compose::unleft");
+    assert_eq!(says, "`D`, which is exported, is not there between `e_built` and `e_released`");
+    assert!(help.contains("`e_released`"), "{help}");
+    let before = [("arm.lua", "making = state { entry = 'make' }", "making = state { entry = { 'e_built', 'make' } }")];
+    assert!(one(&before, "compose::unleft").0.contains("`D`"));
+}
+
+#[test]
+fn parameters_are_typed_and_given_once() {
+    let gain =
+        |text: &str| [("pair.yaml", "gain: 0.7", text)].map(|(f, a, b)| (f.to_owned(), a.to_owned(), b.to_owned()));
+    for (text, says) in [
+        ("gain: 3.0", "the parameter `gain`: 3 is outside 0 … 2"),
+        ("gain: fast", "the parameter `gain`:"),
+        ("gian: 0.7", "there is no parameter `gian`"),
+    ] {
+        let [(file, before, after)] = gain(text);
+        let (told, _) = one(&[(&file, &before, &after)], "compose::parameter");
+        assert!(told.starts_with(says), "{told}");
+    }
+    let needed = [("arm.yaml", "default: 0.5, ", "")];
+    let (says, help) = one(&needed, "compose::parameter");
+    assert!(says.contains("`right` does not give the parameter `gain`") && help.contains("default"), "{says}: {help}");
+    // By the command line, to any depth.
+    let value = |set: &[(&str, &str)]| {
+        let deployment = load(&files(&[]), "pair.yaml", set).deployment.unwrap();
+        let make = deployment.configurations.iter().find(|c| c.id.as_str() == "left/make").unwrap();
+        make.changes.iter().map(|change| change.kind.to_string()).collect::<Vec<_>>().join("; ")
+    };
+    assert!(value(&[]).contains("left/D.k = 0.7"), "{}", value(&[]));
+    assert!(value(&[("left.gain", "1.5")]).contains("left/D.k = 1.5"), "{}", value(&[("left.gain", "1.5")]));
+    let wrong = load(&files(&[]), "pair.yaml", &[("left.gian", "1.5")]);
+    assert!(wrong.findings.iter().any(|finding| finding.is_error()), "{:?}", wrong.findings);
+}
+
+#[test]
+fn files_that_do_not_fit_each_other_are_told() {
+    let circle = [(
+        "arm.yaml",
+        "configurations: [arm_conf.lua]",
+        "configurations: [arm_conf.lua]\nsubsystems: { inner: { deployment: pair.yaml } }",
+    )];
+    assert!(found(&circle).iter().any(|finding| finding.code.0 == "compose::circle"));
+    let platform = [("pair.yaml", "platform: simulated", "platform: embedded")];
+    assert!(found(&platform).iter().any(|finding| finding.code.0 == "compose::differs"), "{:#?}", found(&platform));
+    let word = [("arm.yaml", "emits: [e_built, e_leaving]", "emits: [e_built, e_leaving, up]")];
+    assert!(found(&word).iter().any(|finding| finding.code.0 == "compose::word"));
+    let said = one(&[("pair.lua", "'left/e_leaving'", "'left/e_laeving'")], "compose::unknown");
+    assert!(said.1.contains("did you mean `e_leaving`?"), "{said:?}");
+    let until = one(&[("arm.yaml", "accepts: [e_released]", "accepts: []")], "compose::unknown");
+    assert!(until.0.contains("leaving.until"), "{until:?}");
+    let member = found(&[("arm.yaml", "pose: D.pose", "pose: D.psoe")]);
+    assert!(member.iter().any(|finding| finding.code.0 == "compose::unknown"), "{member:#?}");
+    let driven = [
+        ("arm.yaml", "ref: D.ref", "ref: D.ref"),
+        ("arm_conf.lua", "property_set('D.k', gain)", "property_set('D.k', gain), port_write('D.ref', 1.0)"),
+    ];
+    assert!(found(&driven).iter().any(|finding| finding.code.0 == "compose::export_driven"));
+    // A safety event reaches every subsystem with actuators.
+    let acts = [
+        ("arm.yaml", "  Drive:\n", "  Drive:\n    actuator: true\n"),
+        ("pair.yaml", "types: {}", "types: {}\nsafety: [e_estop]"),
+    ];
+    let unsafe_in: Vec<String> =
+        found(&acts).into_iter().filter(|f| f.code.0 == "compose::safety").map(|f| f.message).collect();
+    assert_eq!(unsafe_in.len(), 2, "{unsafe_in:?}");
+    assert!(unsafe_in[0].contains("`e_estop` does not reach `left`"), "{unsafe_in:?}");
+    let unknown = one(&[("pair.lua", "'left/e_start', 'right", "'left/e_strat', 'right")], "coord::unknown_request");
+    assert!(unknown.0.contains("left/e_strat"), "{unknown:?}");
+}
+
+/// Small compositions: a number of children in a row, and a parent that does some of what it should, in some order.
+fn random(seed: u64) -> Vec<(&'static str, &'static str, String)> {
+    let mut seed = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
+    let mut pick = |of: u64| {
+        seed ^= seed << 13;
+        seed ^= seed >> 7;
+        seed ^= seed << 17;
+        seed % of
+    };
+    let mut changes = Vec::new();
+    let mut swap = |file, before: &'static str, after: &[&str], chance: u64| {
+        if pick(chance) == 0 {
+            let at = pick(after.len() as u64);
+            changes.push((file, before, after[usize::try_from(at).unwrap()].to_owned()));
+        }
+    };
+    swap(
+        "pair.lua",
+        "trans { src = 'one', tgt = 'coupling', events = { 'right/up' } }",
+        &[
+            "trans { src = 'one', tgt = 'coupling', events = { 'right/e_built' } }",
+            "trans { src = 'one', tgt = 'coupling', events = { 'e_go' } }",
+        ],
+        3,
+    );
+    swap(
+        "pair.lua",
+        "parting = state { entry = 'couple.undo' }",
+        &[
+            "parting = state { entry = { 'couple.undo', 'stiff.undo' } }",
+            "parting = state { entry = { 'left/e_shutdown', 'couple.undo' } }",
+            "parting = state { entry = { 'left/e_released', 'couple.undo' } }",
+        ],
+        3,
+    );
+    swap(
+        "pair.lua",
+        "coupled = state {}",
+        &["coupled = state { entry = 'stiff' }", "coupled = state { config = 'stiff' }"],
+        3,
+    );
+    swap(
+        "arm.lua",
+        "trans { src = 'on', tgt = 'leaving', events = { 'e_shutdown' } }",
+        &[
+            "trans { src = 'on', tgt = 'leaving', events = { 'e_shutdown', 'e_tired' } }",
+            "trans { src = 'on', tgt = 'stopping', events = { 'e_shutdown' } }",
+            "trans { src = 'on', tgt = 'leaving', events = { 'e_released', 'e_shutdown' } }",
+        ],
+        3,
+    );
+    swap(
+        "arm.lua",
+        "starting = state { entry = { 'e_built', 'run' } }",
+        &["starting = state { entry = { 'run', 'e_built' } }"],
+        3,
+    );
+    swap(
+        "arm.lua",
+        "trans { src = 'leaving', tgt = 'stopping', events = { 'e_released' } }",
+        &["trans { src = 'leaving', tgt = 'stopping', events = { 'e_released', 'e_after(1.0)' } }"],
+        4,
+    );
+    changes
+}
+
+#[test]
+fn what_is_accepted_file_by_file_is_refused_by_no_product() {
+    let (mut accepted, mut refused) = (0, 0);
+    for seed in 1..60 {
+        let changes = random(seed);
+        let changes: Vec<(&str, &str, &str)> = changes.iter().map(|(f, a, b)| (*f, *a, b.as_str())).collect();
+        let loaded = load(&files(&changes), "pair.yaml", &[]);
+        let deployment = loaded.deployment.unwrap_or_else(|| panic!("{seed}: {:?}", loaded.findings));
+        let types = catalogue(&deployment);
+        let apart = check::run(deployment.clone(), &types);
+        let effort = Effort { together: true, transitions: 30_000, ..Effort::default() };
+        let product = check::run_with(deployment, &types, effort);
+        let violated = |f: &&Finding| {
+            f.severity == Severity::Error
+                && ["coord::request_refused", "conf::still_connected", "conf::unknown_component"].contains(&f.code.0)
+        };
+        let violations: Vec<&Finding> = product.findings.iter().filter(violated).collect();
+        if apart.checked.is_some() {
+            accepted += 1;
+            assert!(violations.is_empty(), "{seed}: {changes:#?}\n{violations:#?}");
+        } else {
+            refused += 1;
+        }
+    }
+    assert!(accepted > 5 && refused > 5, "{accepted} accepted, {refused} refused");
+}
