@@ -3,6 +3,16 @@
 -- The order between configurations is the coordinator's; inside a configuration there is none.
 -- The four configurations of the coupling's switch are in coupling.lua.
 
+-- `stand_in`: a stand-in for the other robot is part of the deployment (deployments/youbot_arm.yaml). In the coupling of two robots there
+-- is none (deployments/youbot_robot.yaml): what the link sends and hears is exported.
+
+local function with_stand_in(changes, more)
+  if stand_in then
+    for _, change in ipairs(more()) do table.insert(changes, change) end
+  end
+  return changes
+end
+
 ConfiguratorConf {
 
   -- Bring-up ---------------------------------------------------------------------------------------------------------
@@ -15,11 +25,12 @@ ConfiguratorConf {
     create("Base_Ctrl",      "youbot.Base_Ctrl",      { activity = "base" }),
   },
 
-  create_link = Configuration { description = "the link to the other robot, and a stand-in for that robot",
+  create_link = Configuration(with_stand_in({ description = "the link to the other robot, and perhaps a stand-in for that robot",
     create("Link_Tx", "youbot.Link_Tx", { activity = "link" }),
     create("Link_Rx", "youbot.Link_Rx", { activity = "link" }),
+  }, function() return {
     create("Peer",    "youbot.Peer",    { activity = "link" }),
-  },
+  } end)),
 
   create_monitors = Configuration { description = "what watches, and the hand of the operator",
     create("Monitors",    "davit.Monitors",     { activity = "safety" }),      -- monitors.lua
@@ -28,7 +39,7 @@ ConfiguratorConf {
     create("Reporter",    "youbot.Reporter",    { activity = "watch" }),
   },
 
-  connect_all = Configuration {
+  connect_all = Configuration(with_stand_in({
     -- control loop
     connect("youbot.jointstate",             "Arm_Kinematics.jointstate"),
     connect("youbot.odometry",               "Arm_Kinematics.odometry"),
@@ -49,8 +60,6 @@ ConfiguratorConf {
     connect("Arm_Kinematics.tool_twist",     "Link_Tx.tool_twist"),
     connect("Cart_Impedance.active",         "Link_Tx.copying"),
     connect("Monitors.is_near",              "Link_Tx.aligned"),
-    connect("Link_Tx.tx",                    "Peer.rx",    { buffer = 64 }),
-    connect("Peer.tx",                       "Link_Rx.rx", { buffer = 64 }),
     -- the operator's hand
     connect("Arm_Kinematics.tool_pose",      "Operator.tool_pose"),
     connect("Arm_Kinematics.tool_twist",     "Operator.tool_twist"),
@@ -67,18 +76,22 @@ ConfiguratorConf {
     connect("Cart_Impedance.f_des",          "Reporter.f_des"),
     connect("Cart_Impedance.f_raw_norm",     "Reporter.f_raw_norm"),
     connect("Cart_Impedance.active",         "Reporter.active"),
-  },
+  }, function() return {
+    connect("Link_Tx.tx",                    "Peer.rx",    { buffer = 64 }),
+    connect("Peer.tx",                       "Link_Rx.rx", { buffer = 64 }),
+  } end)),
 
-  load_properties = Configuration { description = "this robot's own numbers, then everything configured",
+  load_properties = Configuration(with_stand_in({ description = "this robot's own numbers, then everything configured",
     property_set("youbot.q_start",               { 0.0, -1.1257, 2.5395, -1.7802, 0.0 }),
     property_set("Cart_Impedance.stiffness",     150.0),
     property_set("Cart_Impedance.damping_abs",   5.0),
     property_set("Cart_Impedance.offset",        { 0.0, 0.0, 0.0 }),
     property_set("Operator.script",              "free 0.5; align 8; hold 1; sway 600 0.06 0 0 0.15"),
+    post_conf_state = { "_default:configured" },
+  }, function() return {
     property_set("Peer.delay",                   0.005),
     property_set("Peer.force_gain",              { 0.1, 0.1, 0.1 }),   -- its base yields as ours does
-    post_conf_state = { "_default:configured" },
-  },
+  } end)),
 
   start_driver = Configuration { description = "drives on, brakes closed: the arm rests on its stops",
     post_conf_state = { "youbot:running" },
@@ -172,7 +185,7 @@ ConfiguratorConf {
     post_conf_state = { "youbot:unconfigured", "_default:unconfigured" },
   },
 
-  disconnect_all = Configuration {
+  disconnect_all = Configuration(with_stand_in({
     disconnect("youbot.jointstate",             "Arm_Kinematics.jointstate"),
     disconnect("youbot.odometry",               "Arm_Kinematics.odometry"),
     disconnect("Arm_Kinematics.tool_pose",      "Cart_Impedance.tool_pose"),
@@ -191,8 +204,6 @@ ConfiguratorConf {
     disconnect("Arm_Kinematics.tool_twist",     "Link_Tx.tool_twist"),
     disconnect("Cart_Impedance.active",         "Link_Tx.copying"),
     disconnect("Monitors.is_near",              "Link_Tx.aligned"),
-    disconnect("Link_Tx.tx",                    "Peer.rx"),
-    disconnect("Peer.tx",                       "Link_Rx.rx"),
     disconnect("Arm_Kinematics.tool_pose",      "Operator.tool_pose"),
     disconnect("Arm_Kinematics.tool_twist",     "Operator.tool_twist"),
     disconnect("Link_Rx.ext_ref",               "Operator.ext_ref"),
@@ -206,11 +217,16 @@ ConfiguratorConf {
     disconnect("Cart_Impedance.f_des",          "Reporter.f_des"),
     disconnect("Cart_Impedance.f_raw_norm",     "Reporter.f_raw_norm"),
     disconnect("Cart_Impedance.active",         "Reporter.active"),
-  },
+  }, function() return {
+    disconnect("Link_Tx.tx",                    "Peer.rx"),
+    disconnect("Peer.tx",                       "Link_Rx.rx"),
+  } end)),
 
-  destroy_all = Configuration {
+  destroy_all = Configuration(with_stand_in({
     destroy("youbot"), destroy("Arm_Kinematics"), destroy("Cart_Impedance"), destroy("Dynamics"), destroy("Base_Ctrl"),
-    destroy("Link_Tx"), destroy("Link_Rx"), destroy("Peer"),
+    destroy("Link_Tx"), destroy("Link_Rx"),
     destroy("Monitors"), destroy("Operator"), destroy("Mode_Switch"), destroy("Reporter"),
-  },
+  }, function() return {
+    destroy("Peer"),
+  } end)),
 }

@@ -296,6 +296,7 @@ impl<'a> Product<'a> {
     pub(super) fn hear(&mut self, state: ProductState, number: usize, event: EventId, by: Move, nexts: &mut Nexts) {
         let mut state = state;
         self.hears_of_child(&mut state, number, event);
+        self.begins_subsystem(&mut state, number, event);
         for state in self.react(state, number, event) {
             let next = Next::plain(by, self.settle(state), Failed::Nothing);
             nexts.all.push(next);

@@ -136,8 +136,8 @@ pub struct Seen {
     pub stranded: bool,
 }
 
-/// What is to be told when a subsystem that was last told to be `told` is seen so; none: nothing new. The one rule for what runs and what
-/// is followed. A subsystem that was never heard of is down.
+/// What is to be told when a subsystem that was last told to be `told` (none: it was begun since) is seen so; none: nothing new. The one rule
+/// for what runs and what is followed. One that nobody has begun yet counts as told to be down.
 pub fn standing(told: Option<Standing>, seen: Seen) -> Option<Standing> {
     let now = if seen.failed || seen.late && !seen.up {
         Standing::Failed
@@ -150,7 +150,7 @@ pub fn standing(told: Option<Standing>, seen: Seen) -> Option<Standing> {
     } else {
         return None;
     };
-    (told.unwrap_or(Standing::Down) != now).then_some(now)
+    (told != Some(now)).then_some(now)
 }
 
 /// What a refused event is answered with: `left/e_start.ignored`.
@@ -215,7 +215,13 @@ mod tests {
     #[test]
     fn each_change_is_told_once() {
         let seen = Seen::default();
-        assert_eq!(standing(None, Seen { down: true, ..seen }), None, "it is down before anybody asks");
+        let never = Some(Standing::Down);
+        assert_eq!(standing(never, Seen { down: true, ..seen }), None, "it is down before anybody asks");
+        assert_eq!(
+            standing(None, Seen { down: true, ..seen }),
+            Some(Standing::Down),
+            "begun, and down again without having been up"
+        );
         let up = standing(None, Seen { up: true, ..seen });
         assert_eq!(up, Some(Standing::Up));
         assert_eq!(standing(up, Seen { up: true, ..seen }), None);

@@ -131,7 +131,9 @@ impl Subsystems {
             .iter()
             .filter_map(|coordinator| Some((Requester::Coordinator(coordinator.name.into()), coordinator.of?)))
             .collect();
-        let lives = Mutex::new(known.iter().map(|_| Life { empty: true, ..Life::default() }).collect());
+        let lives = Mutex::new(
+            known.iter().map(|_| Life { told: Some(Standing::Down), empty: true, ..Life::default() }).collect(),
+        );
         let (clock, wake) = (clock.clone(), clock.signal());
         Self { all: known, paths, heard, safety, accepted, of, lives, offered: Mutex::default(), clock, wake }
     }
@@ -195,6 +197,7 @@ impl Subsystems {
         let mut lives = lock(&self.lives);
         if event == known.begins {
             (lives[at].up_until, lives[at].down_until) = (Some(now + known.up_within), None);
+            lives[at].told.take_if(|told| *told == Standing::Down);
         } else if event == known.ends {
             (lives[at].down_until, lives[at].up_until) = (Some(now + known.down_within), None);
         } else {

@@ -123,7 +123,7 @@ pub fn youbots(folder: &Path, robots: &[&str]) -> PathBuf {
         all.join(", ")
     };
     let deployment = format!(
-        "davit: 1\nname: youbots\nplatform: embedded\nlibraries: [youbot]\n\
+        "davit: 1\nname: youbots\nplatform: embedded\nlibraries: [youbot]\nwith: {{ stand_in: true }}\n\
          activities:\n  control: {{ period_ms: 1.0, priority: 80 }}\n  link: {{ period_ms: 1.0, priority: 70 }}\n  \
          base: {{ period_ms: 4.0, priority: 60 }}\n  safety: {{ period_ms: 5.0, priority: 75 }}\n  \
          watch: {{ period_ms: 10.0, priority: 40 }}\n\

@@ -137,6 +137,7 @@ fn what_one_robot_does_delays_nothing_of_the_other() {
 name: two_robots
 platform: embedded
 libraries: [youbot]
+with: { stand_in: true }
 activities:
   control: { period_ms: 1.0, priority: 80 }
   link:    { period_ms: 1.0, priority: 70 }
