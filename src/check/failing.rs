@@ -6,10 +6,11 @@
 
 use super::explore::{Barred, Edge, Graph};
 use super::judge::Traced;
-use super::state::Failed;
+use super::state::{Failed, Move};
 use crate::model::Finding;
 use crate::model::Severity;
 use crate::model::codes::COORD_NO_WAY_DOWN;
+use rustc_hash::FxHashSet;
 
 impl Graph<'_, '_> {
     /// Which states a deployment comes to before it is up, or has failed.
@@ -61,7 +62,16 @@ impl Graph<'_, '_> {
             world.is_some_and(|world| !world.is_bare() || !world.stack.is_empty())
         };
         let open = (0u32..).zip(open).filter(|(_, open)| *open).map(|(at, _)| at);
-        let rests = |at: &u32| state(*at).is_at_rest() && !self.product.is_down(state(*at)) && left(*at);
+        // That it is let go comes by itself.
+        let until = self.product.deployment.interface.leaving.map(|leaving| leaving.until);
+        let let_go = |edge: &&Edge| match edge.by {
+            Move::Event(at) => Some(self.product.outside[usize::from(at)]) == until,
+            _ => false,
+        };
+        let let_go: FxHashSet<u32> = self.edges.iter().filter(let_go).map(|edge| edge.from).collect();
+        let rests = |at: &u32| {
+            !let_go.contains(at) && state(*at).is_at_rest() && !self.product.is_down(state(*at)) && left(*at)
+        };
         open.filter(|at| rests(at) && self.failed[*at as usize] <= Failed::Apply).collect()
     }
 

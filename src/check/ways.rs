@@ -11,7 +11,6 @@ use super::tried::Way;
 use crate::model::codes::{DEPLOY_LEFTOVERS, DEPLOY_NEVER_DOWN, DEPLOY_NEVER_UP, STACK_SQUASHED};
 use crate::model::{Code, Coordinator, Finding, Origin, Severity};
 use crate::statechart::NodeId;
-use crate::system::View;
 
 /// What is wrong with the bring-up and the shutdown, with the ways to it from the start.
 pub fn ways(product: &mut Product<'_>) -> Traced {

@@ -6,7 +6,7 @@ use super::{CommandContext, CommandFailure, CommandResult, Run, write_output};
 use crate::diagnostics::Language;
 use crate::lang::{self, LoadOptions, Sources};
 use crate::model::Finding;
-use crate::model::codes::CONVERT_FUNCTIONS;
+use crate::model::codes::{CONVERT_FUNCTIONS, CONVERT_SUBSYSTEMS};
 use std::path::PathBuf;
 
 /// Write the same model in another language.
@@ -64,6 +64,12 @@ impl Run for Args {
                     ..CommandFailure::default()
                 });
             };
+            if let Some(subsystem) = deployment.subsystems.first() {
+                let message = format!("the deployment has subsystems, as `{}` of `{}`", subsystem.name, subsystem.file);
+                let help =
+                    "convert their files, and the files of configurations and the coordinator that this one names";
+                return Err(CommandFailure::no(CONVERT_SUBSYSTEMS, message, help));
+            }
             context.out.findings(&loaded.findings, &loaded.sources);
             for (name, file) in lang::print::kept(&deployment) {
                 let message = format!("the coordinator `{name}` has functions: it stays Lua as it is, in `{file}`");

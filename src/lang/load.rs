@@ -1,9 +1,9 @@
 //! The entrances: a deployment with all its files, or one file alone.
 
 use super::concern;
-use super::files::{self, Sources};
-use super::grammar::{CONFIGURATIONS_FILE, COORDINATOR_FILE, MONITORS_FILE, Object};
-use super::lower::{beside, chart, configuration, deployment, monitor};
+use super::files::Sources;
+use super::grammar::{CONFIGURATIONS_FILE, COORDINATOR_FILE, MONITORS_FILE};
+use super::lower::{chart, configuration, monitor};
 use super::lua;
 use super::params::Params;
 use super::scxml;
@@ -11,17 +11,13 @@ use super::texts::{
     LoadOptions, configuration_tree, coordinator, host_files, loads, monitor_tree, nothing, only_key, open, stem,
     unique,
 };
-use super::tree::{Cx, Entry, Fields, Kind, Node, Reading};
-use super::trusted::{self, Trust, Trusted};
+use super::tree::{Cx, Kind, Reading};
+use super::trusted::{self, Trust};
 use super::whole;
 use super::yaml;
 use crate::diagnostics::{Language, SourceMap};
-use crate::model::{
-    ConfigId, Configuration, Deployment, Finding, Findings, Monitor, Origin, PlatformKind, Program, Statechart, codes,
-};
-use rustc_hash::FxHashMap;
-use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use crate::model::{Configuration, Deployment, Finding, Findings, Monitor, Origin, Program, Statechart, codes};
+use std::path::Path;
 use std::sync::Arc;
 
 /// What loading a deployment gave.

@@ -543,6 +543,9 @@ codes! {
         "A function of a coordinator is a piece of Lua. In YAML there is no word for it, and its text cannot be taken out of \
          its file, which may define what it uses anywhere. A deployment is converted all the same: such a coordinator stays \
          the file that it is, beside those that it loads. To write it in another language make it pure (docs/from-rfsm.md).";
+    CONVERT_SUBSYSTEMS = "convert::subsystems", "a deployment with subsystems is not converted as one",
+        "What is written in the file of a subsystem belongs to that file: put together with what names it, it would be another deployment. \
+         Convert the files one by one.";
     CONVERT_LEFT_OUT = "convert::left_out", "something cannot be written in the language asked for",
         "A field of your own has no place in a pure coordinator, and a function has none in SCXML, where a comment or a \
          condition that is not defined stands for it. What is written says less than what was read.";

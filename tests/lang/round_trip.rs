@@ -489,6 +489,7 @@ fn deployment() -> impl Strategy<Value = Deployment> {
                         up,
                         failed,
                         down,
+                        of: None,
                         origin: Origin::NONE,
                     })
                 };
@@ -504,6 +505,9 @@ fn deployment() -> impl Strategy<Value = Deployment> {
             limits,
             reactions,
             faults,
+            interface: Interface::default(),
+            subsystems: Vec::new(),
+            own: None,
             origin: Origin::NONE,
             key_origins: BTreeMap::new(),
         },

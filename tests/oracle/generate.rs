@@ -423,6 +423,7 @@ fn coordinator(
         up: "s1".to_owned(),
         failed: Vec::new(),
         down: "idle".to_owned(),
+        of: None,
         origin: Origin::NONE,
     }
 }
@@ -498,6 +499,9 @@ pub fn make(chance: &mut Chance) -> Made {
         limits: DeploymentLimits { stack, step_timeout: Duration::from_millis(20) },
         reactions: Vec::new(),
         faults: Vec::new(),
+        interface: Interface::default(),
+        subsystems: Vec::new(),
+        own: None,
         origin: Origin::NONE,
         key_origins: BTreeMap::new(),
     };

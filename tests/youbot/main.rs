@@ -2,6 +2,7 @@
 
 mod bench;
 mod chatter;
+mod composed;
 #[path = "../support/counting.rs"]
 #[allow(dead_code)] // only what one thread asks for
 mod counting;

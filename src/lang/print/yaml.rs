@@ -6,8 +6,8 @@ use super::{change, float, milliseconds, seconds};
 use crate::diagnostics::Language;
 use crate::model::statechart::{Action, ChartNode, ChartTransition, State, Trigger};
 use crate::model::{
-    ComponentType, Configuration, Coordinator, CoordinatorNaming, Deployment, Direction, Effect, Ident, OnFailure,
-    Origin, StateList, Statechart, Tunable, Value,
+    ComponentType, Configuration, Coordinator, CoordinatorNaming, Deployment, Direction, Effect, ExportKind, Ident,
+    Interface, OnFailure, Origin, StateList, Statechart, Tunable, Value,
 };
 use std::fmt::{Display, Write as _};
 
@@ -204,6 +204,33 @@ fn state(out: &mut String, s: &State, indent: usize) {
     }
 }
 
+/// What a deployment shows to one that it is a subsystem of. Its parameters have their values wherever they are used.
+fn interface(out: &mut String, of: &Interface) {
+    if !of.accepts.is_empty() {
+        _ = writeln!(out, "accepts: {}", list(of.accepts.iter().map(|(event, _)| t(event))));
+    }
+    if !of.exports.is_empty() {
+        out.push_str("exports:\n");
+        for (key, kind) in ExportKind::KEYS {
+            let own: Vec<String> = of
+                .exports
+                .iter()
+                .filter(|(_, export)| export.kind == kind)
+                .map(|(name, export)| format!("{}: {}", t(name), t(&export.of)))
+                .collect();
+            if !own.is_empty() {
+                _ = writeln!(out, "  {key}: {{ {} }}", own.join(", "));
+            }
+        }
+        if let Some((event, _)) = of.from {
+            _ = writeln!(out, "  from: {}", t(&event));
+        }
+    }
+    if let Some(leaving) = of.leaving {
+        _ = writeln!(out, "leaving: {{ says: {}, until: {} }}", t(&leaving.says), t(&leaving.until));
+    }
+}
+
 /// `coordinator: …`
 pub fn coordinator_yaml(chart: &Statechart) -> String {
     let mut out = String::from("coordinator:");
@@ -355,6 +382,7 @@ pub fn deployment_yaml(
     if !d.emits.is_empty() {
         _ = writeln!(out, "emits: {}", list(d.emits.iter().map(|(event, _)| t(event))));
     }
+    interface(&mut out, &d.interface);
     if !d.safety.is_empty() {
         _ = writeln!(out, "safety: {}", list(d.safety.iter().map(|(event, _)| t(event))));
     }

@@ -1,0 +1,3 @@
+ConfiguratorConf {
+  join = Configuration { connect("left.pose", "right.ref"), connect("right.pose", "left.ref") },
+}

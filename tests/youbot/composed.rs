@@ -1,0 +1,128 @@
+//! The shipped coupling: two robots, each the file of one, in simulated time and with all coordinators in the loop.
+
+use davit::app;
+use davit::lang::LoadOptions;
+use davit::libraries;
+use davit::model::EventName;
+use davit::session::{Happening, Session};
+use davit::time::{Clock, Time};
+use std::path::Path;
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+/// A deployment that is up, and all that has happened.
+struct Up {
+    clock: Clock,
+    session: Arc<Session>,
+    heard: Arc<Mutex<Vec<(Time, Happening)>>>,
+}
+
+fn up<T>(file: &str, with: impl FnOnce(&Up) -> T) -> T {
+    let clock = Clock::simulated();
+    let _participant = clock.enter();
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("deployments").join(file);
+    let read = app::read(&path, &LoadOptions::default(), libraries::all())
+        .unwrap_or_else(|refused| panic!("{:?}", refused.findings));
+    let checked = app::check(read).unwrap_or_else(|refused| panic!("{:?}", refused.findings));
+    let session = app::start(&checked, &clock).unwrap();
+    let heard: Arc<Mutex<Vec<(Time, Happening)>>> = Arc::default();
+    let own = heard.clone();
+    session.hub().observe(Arc::new(move |at, happening| own.lock().unwrap().push((at, happening.clone()))));
+    session.bring_up().unwrap();
+    let up = Up { clock: clock.clone(), session, heard };
+    let result = with(&up);
+    let ended = up.session.take_down(false);
+    assert!(ended.is_orderly(), "{ended:?}");
+    result
+}
+
+impl Up {
+    fn raise(&self, event: &str) {
+        self.session.raise(EventName::new(event).unwrap(), "operator");
+    }
+
+    fn wait(&self, seconds: f64) {
+        self.clock.sleep(Duration::from_secs_f64(seconds));
+    }
+
+    fn wait_for(&self, states: &[&str], seconds: f64) {
+        let until = self.clock.now() + Duration::from_secs_f64(seconds);
+        while !states.iter().all(|state| self.session.in_state(state)) {
+            assert!(self.clock.now() < until, "not {states:?} but {:?}", self.session.hub().active());
+            self.wait(0.001);
+        }
+    }
+
+    fn is(&self, state: &str) -> bool {
+        self.session.in_state(state)
+    }
+
+    /// Events that were heard, with when.
+    fn events(&self) -> Vec<(Time, String)> {
+        let event = |(at, happening): &(Time, Happening)| match happening {
+            Happening::Event { event, .. } => Some((*at, event.clone())),
+            _ => None,
+        };
+        self.heard.lock().unwrap().iter().filter_map(event).collect()
+    }
+
+    fn state_since(&self, state: &str) -> Option<Time> {
+        let heard = self.heard.lock().unwrap();
+        let entered = heard.iter().rev().find(|(_, happening)| {
+            matches!(happening, Happening::State { active } if active.last().is_some_and(|leaf| leaf == state))
+        });
+        entered.map(|(at, _)| *at)
+    }
+}
+
+fn seconds(time: Time) -> f64 {
+    time.as_secs_f64()
+}
+
+#[test]
+fn both_come_up_side_by_side_and_couple() {
+    let alone = up("youbot_robot.yaml", |one| seconds(one.clock.now()));
+    up("youbot_coupling.yaml", |both| {
+        let took = seconds(both.clock.now());
+        assert!(took <= 1.1 * alone, "one takes {alone} s, both {took} s");
+        both.wait_for(&["left:copying", "right:copying"], 20.0);
+        both.wait(5.0);
+        assert!(both.is("left:copying") && both.is("right:copying"), "{:?}", both.session.hub().active());
+    });
+}
+
+#[test]
+fn what_one_does_delays_nothing_of_the_other() {
+    up("youbot_coupling.yaml", |both| {
+        both.wait_for(&["left:copying", "right:copying"], 20.0);
+        // A mode of one is begun and answered while the other one parks, which takes seconds.
+        both.raise("left/e_5dof");
+        both.wait(0.0);
+        both.wait_for(&["left:five_DOF_mode"], 0.002);
+        assert!(both.is("right:eight_DOF_mode"));
+        both.raise("e_estop");
+        both.wait(0.01);
+        assert!(both.is("left:fault") && both.is("right:fault"), "an emergency stop is for both");
+        both.raise("left/e_reset");
+        both.wait(0.5);
+        assert!(both.is("left:operational") && both.is("right:fault"), "{:?}", both.session.hub().active());
+        both.raise("right/e_reset");
+        both.wait_for(&["left:copying", "right:copying"], 10.0);
+    });
+}
+
+#[test]
+fn each_is_told_of_once_and_only_its_parent_hears() {
+    up("youbot_coupling.yaml", |both| {
+        both.wait(0.1);
+        let told = |word: &str| both.events().iter().filter(|(_, event)| event == word).count();
+        assert_eq!((told("left/up"), told("right/up")), (1, 1), "{:?}", both.events());
+        assert_eq!((told("left/failed"), told("left/down")), (0, 0));
+        // Nothing of one's own is heard under the name that it has in its file.
+        let bare = |event: &str| !event.contains('/') && event != "e_start";
+        assert!(!both.events().iter().any(|(_, event)| bare(event)), "{:?}", both.events());
+        let joined = both.state_since("youbot_coupling:root.alive.joined").unwrap();
+        let last = both.events().iter().filter(|(_, event)| event.ends_with("/up")).map(|(at, _)| *at).max().unwrap();
+        assert!(joined >= last);
+    });
+}
