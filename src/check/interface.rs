@@ -5,7 +5,8 @@ use crate::model::codes::{COMPOSE_EXPORT_DRIVEN, COMPOSE_SAFETY, COMPOSE_UNKNOWN
 use crate::model::finding::did_you_mean;
 use crate::model::subsystem::{ExportKind, IGNORED};
 use crate::model::{
-    Catalogue, ChangeKind, Deployment, Direction, EventName, Finding, Findings, Ident, Origin, Standing, Subsystem,
+    Catalogue, ChangeKind, Deployment, Direction, EventName, Finding, Findings, Ident, Origin, Subsystem,
+    SubsystemStanding,
 };
 use crate::statechart::{Chart, EventId};
 use crate::system::MemberClass;
@@ -73,7 +74,7 @@ fn events(deployment: &Deployment, charts: &[&Chart], findings: &mut Findings) {
         .collect();
     for (event, origin) in deployment.emits.iter().chain(&interface.accepts) {
         let text = event.as_str();
-        if Standing::ALL.iter().any(|word| word.word() == text) || text.ends_with(IGNORED) {
+        if SubsystemStanding::ALL.iter().any(|word| word.word() == text) || text.ends_with(IGNORED) {
             let message = format!("`{event}` is told of every subsystem by itself");
             findings.push(Finding::error(COMPOSE_WORD, message).at(*origin).help("give the event another name"));
         }
@@ -109,7 +110,7 @@ pub fn told_by(subsystem: &Subsystem) -> BTreeSet<EventName> {
     let ignored = accepts.filter_map(|event| EventName::new(&format!("{event}{IGNORED}")).ok());
     let emits = own.emits.iter().map(|(event, _)| *event);
     let told = emits.chain(ignored).map(|event| event.within(subsystem.name));
-    told.chain(Standing::ALL.map(|word| word.event(subsystem.name))).collect()
+    told.chain(SubsystemStanding::ALL.map(|word| word.event(subsystem.name))).collect()
 }
 
 /// What is wrong between a deployment and its subsystems. `own` is what stands in its own file.

@@ -9,6 +9,7 @@ mod arrive;
 mod aside;
 mod bars;
 mod bound;
+mod children;
 mod closed;
 mod comes;
 mod composed;

@@ -11,15 +11,14 @@
 //! inboxes are empty.
 
 use super::aside::Aside;
+use super::children::{Child, WatchedSubsystem};
 use super::coordinator::outside_events;
 use super::coupling;
 use super::effort::{Effort, Left};
 use super::members::{Member, hears_loss, members};
 use super::outcome::{Comes, ConcurrentWork, EMPTY, Held, Went, WorldId};
-use super::promises::Child;
 use super::reactions::Asked;
 use super::shared_list::{Shared, SharedList};
-use super::standings::Watched;
 use super::state::{Failed, Move, Next, Nexts, ProductState, Reacts, bit, index, one};
 use super::world::Worlds;
 use crate::limits;
@@ -94,7 +93,7 @@ pub struct Product<'a> {
     /// The subsystems of the deployment, as its coordinators know them.
     pub(super) children: Vec<Child>,
     /// The same where their coordinators are among these.
-    pub(super) watched: Vec<Watched>,
+    pub(super) watched: Vec<WatchedSubsystem>,
     /// How much more is followed.
     pub(super) effort: Left<'a>,
     /// What is known of reactions to steps.
@@ -159,7 +158,7 @@ impl<'a> Product<'a> {
         (product.worlds.judged, product.unjudged) = super::stands::judged(deployment, charts);
         product.aside = Aside::of(deployment, &product.members, &product.losable);
         let names: Vec<_> = product.members.iter().map(|member| (member.name, member.of)).collect();
-        product.watched = Watched::all(deployment, &names);
+        product.watched = WatchedSubsystem::all(deployment, &names);
         product.alike = product.alike_events();
         for (place, number) in numbers.iter().enumerate() {
             let own = outside_of(deployment, &views[*number], charts[*number]);

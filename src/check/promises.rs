@@ -2,64 +2,19 @@
 //! to it. The parent asks for what touches it only then, and holds no frame of it any more when the promise ends; the file of the subsystem
 //! takes nothing away before.
 
+use super::children::{Child, begun, promised};
 use super::coordinator::ask_of;
 use super::explore::Graph;
 use super::judge::{Traced, severity_of};
 use super::product::Product;
 use super::state::{Failed, Move, ProductState};
 use crate::model::codes::{COMPOSE_PROMISE, COMPOSE_UNLEFT};
-use crate::model::{Ask, ComponentName, ConfigId, Deployment, EventName, Finding, Ident, Standing};
+use crate::model::{Ask, ComponentName, ConfigId, Deployment, EventName, Finding, Ident, SubsystemStanding};
 use crate::stack::claims;
 use crate::statechart::{EventId, NodeId};
 use crate::system::View;
 use rustc_hash::{FxHashMap, FxHashSet};
 use std::collections::VecDeque;
-
-/// How a parent knows a subsystem.
-#[derive(Debug, Clone)]
-pub struct Child {
-    /// Its name.
-    pub path: Ident,
-    /// The event that begins it.
-    begins: EventName,
-    /// From this one on what it exports is there.
-    from: EventName,
-    up: EventName,
-    /// Until the parent raises this one.
-    until: EventName,
-    down: EventName,
-    /// Configurations that touch what it exports.
-    pub touching: FxHashSet<ConfigId>,
-}
-
-/// Of so many subsystems of one file it is known how they stand.
-pub const MOST_CHILDREN: usize = 32;
-
-impl Child {
-    /// The subsystems of a file, as its coordinators know them.
-    pub fn all(deployment: &Deployment) -> Vec<Self> {
-        let of = |subsystem: &crate::model::Subsystem| {
-            let (own, path) = (&*subsystem.own, subsystem.name);
-            let from = own.interface.from.map_or_else(|| Standing::Up.event(path), |(event, _)| event.within(path));
-            let until = own.interface.leaving.map_or(own.shutdown.event, |leaving| leaving.until).within(path);
-            let touches = |c: &&crate::model::Configuration| {
-                c.id != ConfigId::from(path) && claims::components(c).iter().any(|c| c.local(path).is_some())
-            };
-            let touching = deployment.configurations.iter().filter(touches).map(|c| c.id).collect();
-            let (begins, down) = (own.deploy.event.within(path), Standing::Down.event(path));
-            Self { path, begins, from, up: Standing::Up.event(path), until, down, touching }
-        };
-        deployment.subsystems.iter().take(MOST_CHILDREN).map(of).collect()
-    }
-}
-
-fn begun(at: usize) -> u64 {
-    1 << at
-}
-
-fn promised(at: usize) -> u64 {
-    1 << (at + MOST_CHILDREN)
-}
 
 impl Product<'_> {
     /// A coordinator hears an event: it may tell how a subsystem stands.
@@ -209,7 +164,8 @@ impl Graph<'_, '_> {
         let gone = exported.iter().filter(|name| !there.contains(*name)).min_by_key(|name| name.as_str());
         let Some(gone) = gone else { return };
         let until = interface.leaving.map_or(deployment.shutdown.event, |leaving| leaving.until);
-        let from = interface.from.map_or_else(|| Standing::Up.word().to_owned(), |(event, _)| event.to_string());
+        let from =
+            interface.from.map_or_else(|| SubsystemStanding::Up.word().to_owned(), |(event, _)| event.to_string());
         let message = format!("`{gone}`, which is exported, is not there between `{from}` and `{until}`");
         let export = interface.exports.values().find(|export| export.of.component == *gone);
         let finding = Finding::error(COMPOSE_UNLEFT, message)

@@ -1,51 +1,12 @@
 //! What is told of subsystems by itself where all of a deployment is followed as one: the ways up and down of `davit plan`, and the plain
 //! product that tests hold against what is found file by file.
 
+use super::children::{tell, told};
 use super::product::Product;
 use super::state::ProductState;
-use crate::model::subsystem::{Seen, standing};
-use crate::model::{Deployment, EventName, Ident, Standing};
+use crate::model::subsystem::{SeenStanding, standing};
+use crate::model::{Deployment, EventName, Ident, SubsystemStanding};
 use crate::statechart::EventId;
-
-/// A subsystem with the numbers of its coordinators.
-#[derive(Debug, Clone)]
-pub struct Watched {
-    path: Ident,
-    /// The event that begins it.
-    begins: EventName,
-    members: Vec<usize>,
-}
-
-/// Of so many subsystems it is known what was told of them.
-const MOST: usize = 21;
-
-/// What was told, as a state has it: nothing since it was begun, or one of these; at first *down*.
-const TOLD: [Option<Standing>; 5] =
-    [Some(Standing::Down), None, Some(Standing::Up), Some(Standing::Failed), Some(Standing::Stranded)];
-
-impl Watched {
-    /// The subsystems of a deployment that is put together, by the coordinators of these names.
-    pub fn all(deployment: &Deployment, names: &[(Ident, Option<Ident>)]) -> Vec<Self> {
-        if deployment.own.is_none() {
-            return Vec::new();
-        }
-        let of = |path: Ident| (0..names.len()).filter(|number| names[*number].1 == Some(path)).collect::<Vec<_>>();
-        let all = deployment.all_subsystems().into_iter().map(|(path, subsystem)| {
-            let begins = subsystem.own.deploy.event.within(path);
-            Self { path, begins, members: of(path) }
-        });
-        all.filter(|watched| !watched.members.is_empty()).take(MOST).collect()
-    }
-}
-
-fn told(state: &ProductState, at: usize) -> Option<Standing> {
-    TOLD.get((state.children >> (3 * at) & 7) as usize).copied().flatten()
-}
-
-fn tell(state: &mut ProductState, at: usize, now: Option<Standing>) {
-    let number = TOLD.iter().position(|told| *told == now).unwrap_or_default() as u64;
-    state.children = state.children & !(7 << (3 * at)) | number << (3 * at);
-}
 
 impl Product<'_> {
     /// Tells of what subsystems have come to.
@@ -63,14 +24,14 @@ impl Product<'_> {
         for (at, watched) in self.watched.iter().enumerate() {
             let begins =
                 watched.members.contains(&number) && self.members[number].name_of(event) == Some(watched.begins);
-            if begins && told(state, at) == Some(Standing::Down) {
+            if begins && told(state, at) == Some(SubsystemStanding::Down) {
                 tell(state, at, None);
             }
         }
     }
 
-    fn seen_standing(&self, state: &ProductState, at: usize) -> Seen {
-        let mut seen = Seen { up: true, down: true, ..Seen::default() };
+    fn seen_standing(&self, state: &ProductState, at: usize) -> SeenStanding {
+        let mut seen = SeenStanding { up: true, down: true, ..SeenStanding::default() };
         for number in &self.watched[at].members {
             let (member, leaf) = (&self.members[*number], state.leaves[*number]);
             let inside = |node| member.chart.is_inside(leaf, node);

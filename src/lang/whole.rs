@@ -19,7 +19,7 @@ use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
 /// What a file is given that is read as a part of another one.
-struct Part {
+struct GivenPart {
     /// Whose it is, for messages: `` `left` ``.
     of: String,
     given: Vec<Entry>,
@@ -27,7 +27,7 @@ struct Part {
 }
 
 /// Files that are being read, one as a part of the other.
-struct Reader<'a> {
+struct DeploymentReader<'a> {
     from: &'a Sources,
     options: &'a LoadOptions,
     /// From the outside in, with the places that name them.
@@ -41,13 +41,20 @@ struct Reader<'a> {
 /// A deployment's file with all that it names.
 pub fn deployment(cx: &mut Cx, from: &Sources, path: &Path, options: &LoadOptions) -> Option<Deployment> {
     let known = FxHashMap::default();
-    let mut reader = Reader { from, options, open: vec![(path.to_path_buf(), Origin::NONE)], instances: 0, known };
-    let part = Part { of: "the command line".to_owned(), given: Vec::new(), at: Origin::NONE };
+    let mut reader =
+        DeploymentReader { from, options, open: vec![(path.to_path_buf(), Origin::NONE)], instances: 0, known };
+    let part = GivenPart { of: "the command line".to_owned(), given: Vec::new(), at: Origin::NONE };
     reader.deployment(cx, path, part, &options.set)
 }
 
-impl Reader<'_> {
-    fn deployment(&mut self, cx: &mut Cx, path: &Path, part: Part, set: &[(String, String)]) -> Option<Deployment> {
+impl DeploymentReader<'_> {
+    fn deployment(
+        &mut self,
+        cx: &mut Cx,
+        path: &Path,
+        part: GivenPart,
+        set: &[(String, String)],
+    ) -> Option<Deployment> {
         let (from, options) = (self.from, self.options);
         let (reading, language) = open(cx, from, path, part.at)?;
         if language != Language::Yaml {
@@ -218,7 +225,8 @@ impl Reader<'_> {
                 Some(known) => known.clone(),
                 None => {
                     self.open.push((path.clone(), draft.named_at));
-                    let part = Part { of: format!("`{}`", draft.name), given: draft.parameters, at: draft.named_at };
+                    let part =
+                        GivenPart { of: format!("`{}`", draft.name), given: draft.parameters, at: draft.named_at };
                     let deployment = self.deployment(cx, &folder.join(&draft.file), part, &own).map(Arc::new);
                     self.open.pop();
                     self.known.insert(key, deployment.clone());

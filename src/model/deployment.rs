@@ -9,7 +9,7 @@ use super::names::{ComponentName, ConfigId, EventName, Ident, MemberRef};
 use super::platform_kind::PlatformKind;
 use super::program::Program;
 use super::statechart::{Statechart, is_internal};
-use super::subsystem::{Interface, Subsystem};
+use super::subsystem::Interface;
 use super::value::Value;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
@@ -69,6 +69,21 @@ pub struct Deployment {
     /// Where keys of the file were written, by key path (`deploy.event`, `activities.control.period_ms`), for findings
     /// about them.
     pub key_origins: BTreeMap<String, Origin>,
+}
+
+/// An instance of a deployment's file in another one.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Subsystem {
+    /// What it is called there.
+    pub name: Ident,
+    /// What is written in its file, by the names that it has there; of its own subsystems too.
+    pub own: Arc<Deployment>,
+    /// Its activities that are those of the parent, each with the one it is updated in there.
+    pub activities: BTreeMap<Ident, Ident>,
+    /// Its file, as it is named.
+    pub file: String,
+    /// Where it is named.
+    pub origin: Origin,
 }
 
 /// A coordinator of a deployment. Each has its own state that means *up* and its own that means *down*: a deployment is up

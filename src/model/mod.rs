@@ -2,6 +2,7 @@
 
 pub mod codes;
 pub mod component_type;
+mod composition;
 pub mod condition_walk;
 pub mod configuration;
 pub mod deployment;
@@ -31,7 +32,7 @@ pub use component_type::{
 pub use configuration::{Call, Change, ChangeKind, Configuration, Confirm, OnFailure, Policy};
 pub use deployment::{
     Activity, BringUp, Coordinator, CoordinatorNaming, Deployment, DeploymentLimits, FaultKind, OPERATOR, OperatorMay,
-    SimulatedReaction, StepFault, TakeDown,
+    SimulatedReaction, StepFault, Subsystem, TakeDown,
 };
 pub use event::{Ask, FAULTED, Raise, RequestId, Verdict};
 pub use finding::{Code, Finding, Findings, Origin, Severity};
@@ -47,5 +48,5 @@ pub use snapshot::{ActivityStatus, ComponentSnapshot, Snapshot};
 pub use state_list::{DefaultTwice, StateEntry, StateList, Target};
 pub use statechart::Statechart;
 pub use step::Step;
-pub use subsystem::{Export, ExportKind, Interface, Leaving, Standing, Subsystem};
+pub use subsystem::{Export, ExportKind, Interface, LeavingRule, SubsystemStanding};
 pub use value::{Value, ValueType};

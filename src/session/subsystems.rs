@@ -6,8 +6,8 @@ use super::routes::Junction;
 use crate::configurator::Requester;
 use crate::coordinator::{Class, CoordinatorHandle, Incoming, Tag};
 use crate::limits;
-use crate::model::subsystem::{IGNORED, Seen, standing};
-use crate::model::{Deployment, EventName, Ident, Standing};
+use crate::model::subsystem::{IGNORED, SeenStanding, standing};
+use crate::model::{Deployment, EventName, Ident, SubsystemStanding};
 use crate::statechart::NodeId;
 use crate::time::{Clock, Signal, Time, lock};
 use rustc_hash::FxHashMap;
@@ -16,7 +16,7 @@ use std::time::Duration;
 
 /// A subsystem of a deployment.
 #[derive(Debug)]
-struct Known {
+struct KnownSubsystem {
     path: Ident,
     /// That of its parent; none: the deployment itself.
     parent: Option<Ident>,
@@ -38,8 +38,8 @@ struct Counting {
 
 /// What is known of a subsystem.
 #[derive(Debug, Default)]
-struct Life {
-    told: Option<Standing>,
+struct SubsystemLife {
+    told: Option<SubsystemStanding>,
     /// When it has to be up, and down.
     up_until: Option<Time>,
     down_until: Option<Time>,
@@ -49,7 +49,7 @@ struct Life {
 
 /// An event that a subsystem may take or not.
 #[derive(Debug, Clone, Copy)]
-struct Offered {
+struct OfferedToSubsystem {
     ticket: u64,
     event: EventName,
     by: Requester,
@@ -58,7 +58,7 @@ struct Offered {
 
 /// The subsystems.
 pub(super) struct Subsystems {
-    all: Vec<Known>,
+    all: Vec<KnownSubsystem>,
     /// The subsystem that components with this path are in.
     paths: FxHashMap<&'static str, Ident>,
     /// As what an event is heard that something in a subsystem raises, as far as somebody there waits for it.
@@ -69,8 +69,8 @@ pub(super) struct Subsystems {
     accepted: FxHashMap<EventName, usize>,
     /// The paths of coordinators.
     of: FxHashMap<Requester, Ident>,
-    lives: Mutex<Vec<Life>>,
-    offered: Mutex<Vec<Offered>>,
+    lives: Mutex<Vec<SubsystemLife>>,
+    offered: Mutex<Vec<OfferedToSubsystem>>,
     clock: Clock,
     wake: Signal,
 }
@@ -110,7 +110,7 @@ impl Subsystems {
                 }
             }
             let counting = deployment.coordinators.iter().filter(|coordinator| coordinator.of == Some(*path));
-            known.push(Known {
+            known.push(KnownSubsystem {
                 path: *path,
                 parent,
                 begins: own.deploy.event.within(*path),
@@ -132,7 +132,10 @@ impl Subsystems {
             .filter_map(|coordinator| Some((Requester::Coordinator(coordinator.name.into()), coordinator.of?)))
             .collect();
         let lives = Mutex::new(
-            known.iter().map(|_| Life { told: Some(Standing::Down), empty: true, ..Life::default() }).collect(),
+            known
+                .iter()
+                .map(|_| SubsystemLife { told: Some(SubsystemStanding::Down), empty: true, ..SubsystemLife::default() })
+                .collect(),
         );
         let (clock, wake) = (clock.clone(), clock.signal());
         Self { all: known, paths, heard, safety, accepted, of, lives, offered: Mutex::default(), clock, wake }
@@ -197,7 +200,7 @@ impl Subsystems {
         let mut lives = lock(&self.lives);
         if event == known.begins {
             (lives[at].up_until, lives[at].down_until) = (Some(now + known.up_within), None);
-            lives[at].told.take_if(|told| *told == Standing::Down);
+            lives[at].told.take_if(|told| *told == SubsystemStanding::Down);
         } else if event == known.ends {
             (lives[at].down_until, lives[at].up_until) = (Some(now + known.down_within), None);
         } else {
@@ -231,7 +234,7 @@ impl Subsystems {
             let life = &mut lives[at];
             let now = self.clock.now();
             let over = |until: Option<Time>| until.is_some_and(|until| now >= until);
-            let seen = Seen {
+            let seen = SeenStanding {
                 down: seen.down && life.empty,
                 late: over(life.up_until),
                 stranded: over(life.down_until),
@@ -242,8 +245,8 @@ impl Subsystems {
                 life.told = told;
             }
             match told {
-                Some(Standing::Up) => life.up_until = None,
-                Some(Standing::Down) => life.down_until = None,
+                Some(SubsystemStanding::Up) => life.up_until = None,
+                Some(SubsystemStanding::Down) => life.down_until = None,
                 _ => {}
             }
             told
@@ -254,11 +257,11 @@ impl Subsystems {
         junction.give_to(hub, known.parent, Incoming::new(Class::Report, event));
     }
 
-    fn seen(&self, known: &Known, hub: &Hub, junction: &Junction) -> Seen {
-        let mut seen = Seen { up: true, down: true, ..Seen::default() };
+    fn seen(&self, known: &KnownSubsystem, hub: &Hub, junction: &Junction) -> SeenStanding {
+        let mut seen = SeenStanding { up: true, down: true, ..SeenStanding::default() };
         let before = hub.epoch();
         for (name, states) in &known.coordinators {
-            let Some(coordinator) = junction.coordinator(*name) else { return Seen::default() };
+            let Some(coordinator) = junction.coordinator(*name) else { return SeenStanding::default() };
             let rest = coordinator.is_settled() && hub.has_answered(&name.to_string());
             seen.up &= rest && is_in(&coordinator, &states.up);
             seen.down &= rest && is_in(&coordinator, &states.down);
@@ -266,7 +269,7 @@ impl Subsystems {
         }
         // What is seen between two equal counts was so at one moment; else whoever changed it lets it be looked at again.
         if known.coordinators.len() > 1 && hub.epoch() != before {
-            Seen { failed: seen.failed, ..Seen::default() }
+            SeenStanding { failed: seen.failed, ..SeenStanding::default() }
         } else {
             seen
         }
@@ -280,7 +283,7 @@ impl Subsystems {
             return None;
         }
         let ticket = hub.ticket(to);
-        offered.push(Offered { ticket, event, by, tag });
+        offered.push(OfferedToSubsystem { ticket, event, by, tag });
         Some(ticket)
     }
 
@@ -316,8 +319,9 @@ impl Subsystems {
         self.clock.spawn("subsystems", move || {
             loop {
                 let now = own.clock.now();
-                let of =
-                    |life: &Life| life.up_until.into_iter().chain(life.down_until).filter(|until| *until > now).min();
+                let of = |life: &SubsystemLife| {
+                    life.up_until.into_iter().chain(life.down_until).filter(|until| *until > now).min()
+                };
                 let next = lock(&own.lives).iter().filter_map(of).min();
                 own.wake.wait(next.unwrap_or(Time::NEVER));
                 let Some(junction) = junction.upgrade() else { return };
@@ -338,4 +342,14 @@ impl Subsystems {
 fn is_in(coordinator: &CoordinatorHandle, state: &str) -> bool {
     let node: Option<NodeId> = coordinator.chart().find(state).ok();
     node.is_some_and(|node| coordinator.is_active(node))
+}
+
+/// The subsystems of a deployment with the names under which all their coordinators ask, those of what is in them too.
+pub(super) fn scopes(deployment: &Deployment) -> Vec<(Ident, Vec<Requester>)> {
+    let inside = |path: Ident| {
+        let own = deployment.coordinators.iter();
+        let own = own.filter(move |c| c.of.is_some_and(|of| of == path || of.local(path).is_some()));
+        own.map(|c| Requester::Coordinator(c.name.into())).collect()
+    };
+    deployment.all_subsystems().into_iter().map(|(path, _)| (path, inside(path))).collect()
 }

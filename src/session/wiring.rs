@@ -89,7 +89,7 @@ impl Session {
             catalogue,
             activities: deployment.activities.keys().copied().collect(),
             coordinators: deployment.coordinators.iter().map(|c| Requester::Coordinator(c.name.into())).collect(),
-            subsystems: scopes(&deployment),
+            subsystems: super::subsystems::scopes(&deployment),
             platform: platform.clone(),
             clock: clock.clone(),
             limits: deployment.limits,
@@ -484,16 +484,6 @@ impl FrameStatus {
             unseen: frame.unseen,
         }
     }
-}
-
-/// The subsystems of a deployment with the names under which all their coordinators ask, those of what is in them too.
-fn scopes(deployment: &Deployment) -> Vec<(Ident, Vec<Requester>)> {
-    let inside = |path: Ident| {
-        let own = deployment.coordinators.iter();
-        let own = own.filter(move |c| c.of.is_some_and(|of| of == path || of.local(path).is_some()));
-        own.map(|c| Requester::Coordinator(c.name.into())).collect()
-    };
-    deployment.all_subsystems().into_iter().map(|(path, _)| (path, inside(path))).collect()
 }
 
 /// For those who hold a session only to look at it.

@@ -8,7 +8,12 @@ use davit::model::Monitor;
 use std::path::Path;
 
 fn read(file: &str, text: &str) -> LoadedMonitors {
-    lang::load_monitors(&Sources::memory([(file, text)]), Path::new(file), &LoadOptions::default())
+    let set = if text.contains("stand_in") { vec![("stand_in".to_owned(), "true".to_owned())] } else { Vec::new() };
+    lang::load_monitors(
+        &Sources::memory([(file, text)]),
+        Path::new(file),
+        &LoadOptions { set, ..LoadOptions::default() },
+    )
 }
 
 fn good(file: &str, text: &str) -> Vec<Monitor> {

@@ -16,7 +16,23 @@ const BESIDE: &[(&str, &str)] = &[
     ("gripper.lua", COORDINATOR),
     ("monitors.lua", "Monitors { high = monitor { when = above(\"A.x\", 2.0), event = \"e_high\" } }"),
     ("robot.lua", ""),
+    ("robot.yaml", ROBOT),
+    ("delayed.lua", "ConfiguratorConf { up = Configuration { property_set(\"A.k\", delay_s) } }"),
 ];
+/// A deployment that can be a subsystem.
+const ROBOT: &str = "davit: 1
+name: robot
+platform: embedded
+libraries: [standard]
+parameters: { delay_s: { type: float, default: 0.005 } }
+activities: { control: { period_ms: 1.0 } }
+configurations: [delayed.lua]
+coordinator: coordinator.lua
+deploy: { event: e_start, up: idle, within_s: 5 }
+shutdown: { event: e_shutdown, down: idle, within_s: 5 }
+";
+/// One that uses the parameter whose table is tried.
+const WITH_A: &str = "ConfiguratorConf { up = Configuration { property_set(\"A.k\", a) } }";
 const COORDINATOR: &str = "return state { idle = state {}, trans { src = \"initial\", tgt = \"idle\" } }";
 /// One that uses the parameter of the example of `with`.
 const WITH_GAIN: &str = "ConfiguratorConf { up = Configuration { property_set(\"A.k\", gain) } }";
@@ -41,6 +57,11 @@ fn least(object: &Object) -> Mapping {
     if object.name == "deployment" {
         put(&mut table, "libraries: [standard]");
         put(&mut table, "coordinator: coordinator.lua");
+        // What subsystems may be updated in.
+        put(&mut table, "activities: { control: { period_ms: 1.0, priority: 80 } }");
+    }
+    if object.name == "subsystem" {
+        put(&mut table, "deployment: robot.yaml");
     }
     table
 }
@@ -92,7 +113,8 @@ fn holds(outer: &'static Object, inner: &Object) -> Option<&'static Key> {
 
 /// Loads a file of that kind, in a deployment.
 fn load(file: &File, text: &str, name: &str) -> Loaded {
-    let gain = text.contains("with:") && text.contains("gain");
+    let gain = (text.contains("with:") || text.contains("parameters:")) && text.contains("gain");
+    let a = text.contains("parameters:\n  a:");
     let deployment = match file.name {
         "deployment" => text.to_owned(),
         kind => {
@@ -108,11 +130,14 @@ fn load(file: &File, text: &str, name: &str) -> Loaded {
     };
     let mut files = vec![("d.yaml", deployment.as_str()), (name, text)];
     let other = |(name, text): &(&'static str, &'static str)| match *name {
+        "configurations.lua" if a => ("configurations.lua", WITH_A),
         "configurations.lua" if gain => ("configurations.lua", WITH_GAIN),
         _ => (*name, *text),
     };
     files.extend(BESIDE.iter().map(other));
-    lang::load_from(&Sources::memory(files), Path::new("d.yaml"), &LoadOptions::default())
+    // One without a default must be given.
+    let set = if a { vec![("a".to_owned(), "0.5".to_owned())] } else { Vec::new() };
+    lang::load_from(&Sources::memory(files), Path::new("d.yaml"), &LoadOptions { set, ..LoadOptions::default() })
 }
 
 /// Whether reading refuses it, or the compiler of statecharts, which sees what a chart as a whole lacks.
@@ -248,7 +273,8 @@ fn the_schema_says_what_reading_says() {
             if key.language != Languages::None {
                 assert!(validator.is_valid(&as_json(&read)), "{what}: {read:?}");
             }
-            let beyond = BEYOND.contains(&key.code) || (object.name == "property" && key.refused == "type: event");
+            let beyond = BEYOND.contains(&key.code)
+                || (["property", "parameter"].contains(&object.name) && key.refused == "type: event");
             // What is inside a condition it does not look at; a connector that is none is a state to it.
             let unseen = matches!(object.name, "comparison" | "connector");
             if !beyond && !unseen {

@@ -6,7 +6,7 @@ use crate::lang::grammar::{EXPORTS, LEAVING, PARAMETER, SUBSYSTEM};
 use crate::lang::tree::{Cx, Entry, Fields, Kind, Node};
 use crate::model::subsystem::ExportKind;
 use crate::model::{
-    EventName, Export, Finding, Ident, Interface, Leaving, MemberRef, Origin, PropertyType, Tunable, codes,
+    EventName, Export, Finding, Ident, Interface, LeavingRule, MemberRef, Origin, PropertyType, Tunable, codes,
 };
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -94,12 +94,12 @@ fn exports(cx: &mut Cx, node: Node, interface: &mut Interface) {
     fields.finish(cx);
 }
 
-fn leaving(cx: &mut Cx, node: Node) -> Option<Leaving> {
+fn leaving(cx: &mut Cx, node: Node) -> Option<LeavingRule> {
     let origin = node.origin;
     let mut fields = Fields::of(cx, node, &LEAVING)?;
     let (says, until) = (fields.name(cx, "says"), fields.name(cx, "until"));
     fields.finish(cx);
-    Some(Leaving { says: says?, until: until?, origin })
+    Some(LeavingRule { says: says?, until: until?, origin })
 }
 
 /// `subsystems`

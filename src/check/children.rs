@@ -1,0 +1,98 @@
+//! Subsystems as those know them who follow their parent, and as a state has them.
+
+use super::state::ProductState;
+use crate::model::{ConfigId, Configuration, Deployment, EventName, Ident, Subsystem, SubsystemStanding};
+use crate::stack::claims;
+use rustc_hash::FxHashSet;
+
+/// How a parent knows a subsystem.
+#[derive(Debug, Clone)]
+pub struct Child {
+    /// Its name.
+    pub path: Ident,
+    /// The event that begins it.
+    pub begins: EventName,
+    /// From this one on what it exports is there.
+    pub from: EventName,
+    pub up: EventName,
+    /// Until the parent raises this one.
+    pub until: EventName,
+    pub down: EventName,
+    /// Configurations that touch what it exports.
+    pub touching: FxHashSet<ConfigId>,
+}
+
+/// Of so many subsystems of one file it is known how they stand.
+pub const MOST_CHILDREN: usize = 32;
+
+impl Child {
+    /// The subsystems of a file, as its coordinators know them.
+    pub fn all(deployment: &Deployment) -> Vec<Self> {
+        let of = |subsystem: &Subsystem| {
+            let (own, path) = (&*subsystem.own, subsystem.name);
+            let from =
+                own.interface.from.map_or_else(|| SubsystemStanding::Up.event(path), |(event, _)| event.within(path));
+            let until = own.interface.leaving.map_or(own.shutdown.event, |leaving| leaving.until).within(path);
+            let touches = |c: &&Configuration| {
+                c.id != ConfigId::from(path) && claims::components(c).iter().any(|c| c.local(path).is_some())
+            };
+            let touching = deployment.configurations.iter().filter(touches).map(|c| c.id).collect();
+            let (begins, down) = (own.deploy.event.within(path), SubsystemStanding::Down.event(path));
+            Self { path, begins, from, up: SubsystemStanding::Up.event(path), until, down, touching }
+        };
+        deployment.subsystems.iter().take(MOST_CHILDREN).map(of).collect()
+    }
+}
+
+pub fn begun(at: usize) -> u64 {
+    1 << at
+}
+
+pub fn promised(at: usize) -> u64 {
+    1 << (at + MOST_CHILDREN)
+}
+
+/// A subsystem with the numbers of its coordinators.
+#[derive(Debug, Clone)]
+pub struct WatchedSubsystem {
+    pub path: Ident,
+    /// The event that begins it.
+    pub begins: EventName,
+    pub members: Vec<usize>,
+}
+
+/// Of so many subsystems it is known what was told of them.
+const MOST: usize = 21;
+
+/// What was told, as a state has it: nothing since it was begun, or one of these; at first *down*.
+const TOLD: [Option<SubsystemStanding>; 5] = [
+    Some(SubsystemStanding::Down),
+    None,
+    Some(SubsystemStanding::Up),
+    Some(SubsystemStanding::Failed),
+    Some(SubsystemStanding::Stranded),
+];
+
+impl WatchedSubsystem {
+    /// The subsystems of a deployment that is put together, by the coordinators of these names.
+    pub fn all(deployment: &Deployment, names: &[(Ident, Option<Ident>)]) -> Vec<Self> {
+        if deployment.own.is_none() {
+            return Vec::new();
+        }
+        let of = |path: Ident| (0..names.len()).filter(|number| names[*number].1 == Some(path)).collect::<Vec<_>>();
+        let all = deployment.all_subsystems().into_iter().map(|(path, subsystem)| {
+            let begins = subsystem.own.deploy.event.within(path);
+            Self { path, begins, members: of(path) }
+        });
+        all.filter(|watched| !watched.members.is_empty()).take(MOST).collect()
+    }
+}
+
+pub fn told(state: &ProductState, at: usize) -> Option<SubsystemStanding> {
+    TOLD.get((state.children >> (3 * at) & 7) as usize).copied().flatten()
+}
+
+pub fn tell(state: &mut ProductState, at: usize, now: Option<SubsystemStanding>) {
+    let number = TOLD.iter().position(|told| *told == now).unwrap_or_default() as u64;
+    state.children = state.children & !(7 << (3 * at)) | number << (3 * at);
+}
