@@ -112,6 +112,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         catalogue,
         activities: BTreeSet::new(),
         coordinators: BTreeSet::new(),
+        subsystems: Vec::new(),
         platform,
         clock: clock.clone(),
         limits: DeploymentLimits::default(),

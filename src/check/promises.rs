@@ -9,7 +9,7 @@ use super::judge::{Traced, severity_of};
 use super::product::Product;
 use super::state::{Failed, Move, ProductState};
 use crate::model::codes::{COMPOSE_PROMISE, COMPOSE_UNLEFT};
-use crate::model::{Ask, ComponentName, ConfigId, Deployment, EventName, Finding, Ident, SubsystemStanding};
+use crate::model::{Ask, ComponentName, ConfigId, EventName, Finding, SubsystemStanding};
 use crate::stack::claims;
 use crate::statechart::{EventId, NodeId};
 use crate::system::View;

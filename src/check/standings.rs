@@ -5,7 +5,7 @@ use super::children::{tell, told};
 use super::product::Product;
 use super::state::ProductState;
 use crate::model::subsystem::{SeenStanding, standing};
-use crate::model::{Deployment, EventName, Ident, SubsystemStanding};
+use crate::model::SubsystemStanding;
 use crate::statechart::EventId;
 
 impl Product<'_> {
