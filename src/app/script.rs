@@ -33,7 +33,7 @@ pub use failure::ScriptFailure;
 pub use figures::{Figure, digits};
 pub use interrupt::Interrupt;
 use mlua::{FromLua, Lua, Table, Value as LuaValue};
-use options::{Fields, force};
+use options::{OptionFields, force};
 pub use recordings::ScriptSample;
 pub use scene::ScriptScene;
 use std::any::Any;
@@ -256,7 +256,7 @@ fn install(lua: &Lua, host: &SharedHost) -> mlua::Result<()> {
     }
     function!("deploy", (String, Option<Table>), |h, _lua, (file, options)| deploying::deploy(h, &file, options));
     function!("raise", (String, Option<Table>), |h, _lua, (event, options)| {
-        raise(h, &event, Fields::of("raise", options, &["to"])?.names("to")?)
+        raise(h, &event, OptionFields::of("raise", options, &["to"])?.names("to")?)
     });
     function!("apply", (String, Option<Table>), |h, _lua, (id, options)| {
         request(h, Some(&id), Ask::Apply, force("apply", options)?)
@@ -266,7 +266,7 @@ fn install(lua: &Lua, host: &SharedHost) -> mlua::Result<()> {
     });
     function!("set", (String, LuaValue, Option<Table>), |h, _lua, (member, value, options)| {
         let (session, value) = (session(h)?, values::from_lua(&value)?);
-        let options = Fields::of("set", options, &["force", "within"])?;
+        let options = OptionFields::of("set", options, &["force", "within"])?;
         let (force, within) = (options.flag("force")?, options.number("within")?);
         listen_anew(h, &session);
         let set = session.set(LINE, &member, &value, force);

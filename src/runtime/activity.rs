@@ -4,7 +4,7 @@
 //! components, and no lock.
 
 use super::call::{Reply, Responder};
-use super::cell::{Asked, Cell, CellGuard};
+use super::cell::{Cell, CellGuard, CellRequest};
 use super::gate::Closed;
 use super::latest::Reader;
 use crate::limits;
@@ -22,7 +22,7 @@ pub(crate) type Schedule = Arc<[Arc<Cell>]>;
 /// An operation to be run in the activity's thread.
 pub(crate) struct OperationJob {
     pub(crate) cell: Arc<Cell>,
-    pub(crate) asked: Asked,
+    pub(crate) asked: CellRequest,
     pub(crate) call: Responder,
     /// It does not wait until a call that was given up has come to rest.
     pub(crate) safe: bool,

@@ -15,7 +15,7 @@ use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::time::Duration;
 
 /// What is asked of a component that somebody enters.
-pub(crate) enum Asked {
+pub(crate) enum CellRequest {
     /// An operation, by its index, with its arguments.
     Operation(usize, Vec<Value>),
     /// An injection that its type declares, by its index, with its values.
@@ -151,29 +151,37 @@ impl CellGuard<'_> {
     }
 
     /// Calls an operation. Its answer is sent by [`CallEnded::answer`], after leaving: who hears it may call again at once.
-    pub(crate) fn operation(&mut self, clock: &Clock, asked: &Asked, call: Responder) -> CallEnded {
+    pub(crate) fn operation(&mut self, clock: &Clock, asked: &CellRequest, call: Responder) -> CallEnded {
         self.with(|cell, body| operate(cell, body.as_mut(), clock, asked, call))
     }
 }
 
-fn operate(cell: &Cell, body: Option<&mut Box<dyn Body>>, clock: &Clock, asked: &Asked, call: Responder) -> CallEnded {
+fn operate(
+    cell: &Cell,
+    body: Option<&mut Box<dyn Body>>,
+    clock: &Clock,
+    asked: &CellRequest,
+    call: Responder,
+) -> CallEnded {
     cell.beat.set_now(clock.now());
     let to = call.0.clone();
     let mut cx = Context::of_call(clock, &cell.beat, call);
     let result = match body {
         None => Ok(Some(Reply::Refused("the component is gone".to_owned()))),
         Some(body) => guard::call(|| match asked {
-            Asked::Operation(index, _) if cell.trap.compare_exchange(*index, UNTRAPPED, AcqRel, Relaxed).is_ok() => {
+            CellRequest::Operation(index, _)
+                if cell.trap.compare_exchange(*index, UNTRAPPED, AcqRel, Relaxed).is_ok() =>
+            {
                 clock.hang()
             }
-            Asked::Operation(index, args) => body.operation(*index, args, &mut cx),
-            Asked::Injection(index, values) => body.inject(*index, values, &mut cx),
-            Asked::Hang | Asked::Panic | Asked::Stall(_) => {
+            CellRequest::Operation(index, args) => body.operation(*index, args, &mut cx),
+            CellRequest::Injection(index, values) => body.inject(*index, values, &mut cx),
+            CellRequest::Hang | CellRequest::Panic | CellRequest::Stall(_) => {
                 // It has happened now, whatever comes of it.
                 to.answer(Reply::Done(None));
                 match asked {
-                    Asked::Hang => clock.hang(),
-                    Asked::Stall(time) => clock.sleep(*time),
+                    CellRequest::Hang => clock.hang(),
+                    CellRequest::Stall(time) => clock.sleep(*time),
                     // It is no defect of the place it comes from.
                     _ => resume_unwind(Box::new("a panic was injected".to_owned())),
                 }

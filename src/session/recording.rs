@@ -183,7 +183,7 @@ impl Recording {
             watch.look(now, &mut samples);
             lock(&self.state).add(now, &samples, room);
             while next <= now {
-                next = next + self.every;
+                next += self.every;
             }
         }
     }

@@ -99,7 +99,7 @@ fn what_a_type_declares_happens_in_the_middle_of_an_operation() {
     let failed = Outcome::NotDone(Cause::Failed("joint 3 is hot".to_owned()));
     assert_eq!(*outcome.lock().unwrap(), Some(failed));
     assert_eq!(b.inject("a", "overtemp", &[("joint", Value::Int(5))]), Err("there are joints 0 to 4".to_owned()));
-    assert_eq!(b.inject("c", "overtemp", &[]), Err("refused: there is no component `c`".to_owned()));
+    assert_eq!(b.inject("c", "overtemp", &[]), Err("refused by the platform: there is no component `c`".to_owned()));
 }
 
 #[test]
@@ -151,7 +151,11 @@ fn a_hang_leaves_what_is_under_way_unknown() {
     b.inject("a", "hang", &[]).unwrap();
     b.wait(100 * MS);
     assert_eq!(*outcome.lock().unwrap(), Some(Outcome::Unknown(Cause::Timeout)));
-    assert_eq!(b.platform.quarantined(), [name("a")]);
+    // Its update is what does not return: whoever shares its activity waits, too.
+    b.wait(Duration::from_secs(2));
+    let stuck: Vec<_> = b.platform.activities().iter().filter_map(|activity| activity.stuck).collect();
+    assert_eq!(stuck, [name("a")]);
+    assert_eq!(b.run_within(&call("b.quick", vec![]), 20 * MS), Outcome::NotDone(Cause::Timeout));
     b.clock.shutdown();
 }
 

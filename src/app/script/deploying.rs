@@ -1,7 +1,7 @@
 //! `deploy(file)`: checked, brought up, and known to whoever may stop or steer it.
 
 use super::failure::IsRefused;
-use super::options::Fields;
+use super::options::OptionFields;
 use super::{SharedHost, clock, error, interrupt};
 use crate::app::start::Played;
 use crate::app::{StartError, check, check_to_replay, read_for, start};
@@ -10,7 +10,7 @@ use crate::session::NotUp;
 use mlua::Table;
 
 pub(super) fn deploy(host: &SharedHost, file: &str, options: Option<Table>) -> mlua::Result<()> {
-    let replay = Fields::of("deploy", options, &["replay"])?.flag("replay")?;
+    let replay = OptionFields::of("deploy", options, &["replay"])?.flag("replay")?;
     interrupt(host).check()?;
     if host.borrow().session.is_some() {
         return Err(error("a deployment is already up: call shutdown() before the next deploy"));

@@ -1,6 +1,6 @@
 //! Figures: what a script has measured, each with the bounds in which it is expected.
 
-use super::options::Fields;
+use super::options::OptionFields;
 use super::{SharedHost, error};
 use crate::limits;
 use crate::model::finding::count;
@@ -69,7 +69,7 @@ pub(super) fn add(host: &SharedHost, lua: &Lua, table: Table, bounded: bool) -> 
         true => ("expect", &["name", "value", "min", "max", "unit", "fatal"]),
         false => ("figure", &["name", "value", "unit"]),
     };
-    let fields = Fields::of(function, Some(table), known)?;
+    let fields = OptionFields::of(function, Some(table), known)?;
     let name = fields.needed("name", fields.text("name")?, "what the figure is of, such as \"rms error\"")?;
     let value = fields.needed("value", fields.number("value")?, "the number that was measured")?;
     let (min, max) = (fields.number("min")?, fields.number("max")?);

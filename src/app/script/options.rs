@@ -6,12 +6,12 @@ use mlua::{Table, Value};
 use std::collections::BTreeMap;
 
 /// The fields of a table, which are those that a function takes: another one is a typo.
-pub(super) struct Fields {
+pub(super) struct OptionFields {
     function: &'static str,
     given: BTreeMap<&'static str, Value>,
 }
 
-impl Fields {
+impl OptionFields {
     pub(super) fn of(
         function: &'static str,
         table: Option<Table>,
@@ -94,5 +94,5 @@ impl Fields {
 
 /// Whether the one option that there is is set.
 pub(super) fn force(function: &'static str, options: Option<Table>) -> mlua::Result<bool> {
-    Fields::of(function, options, &["force"])?.flag("force")
+    OptionFields::of(function, options, &["force"])?.flag("force")
 }

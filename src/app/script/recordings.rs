@@ -1,6 +1,6 @@
 //! `sample{ every = 0.01, signals = { e = "Arm.error" } }`: series that are recorded while the script goes on.
 
-use super::options::Fields;
+use super::options::OptionFields;
 use super::{SharedHost, error, seen, session};
 use crate::limits;
 use crate::model::Ident;
@@ -48,7 +48,7 @@ impl Recordings {
 
 /// Begins a recording.
 pub(super) fn sample(host: &SharedHost, table: Table) -> mlua::Result<ScriptSample> {
-    let fields = Fields::of("sample", Some(table), &["every", "signals", "name"])?;
+    let fields = OptionFields::of("sample", Some(table), &["every", "signals", "name"])?;
     let every = fields.needed("every", fields.number("every")?, "how often to look, in seconds, such as 0.01")?;
     let shortest = limits::SHORTEST_PERIOD.as_secs_f64();
     if !(shortest..=1e6).contains(&every) {

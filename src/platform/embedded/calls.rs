@@ -10,7 +10,7 @@ use crate::platform::{Cause, PlatformEvent};
 use crate::runtime::activity::{ActivityThread, OperationJob};
 use crate::runtime::builder::CallerFn;
 use crate::runtime::call::{CallProgress, Reply, Responder};
-use crate::runtime::cell::{Asked, Cell, CellGuard};
+use crate::runtime::cell::{Cell, CellGuard, CellRequest};
 use crate::runtime::gate::Closed;
 use crate::runtime::guard;
 use crate::time::{Receiver, RecvError, Sender, Time, lock};
@@ -182,7 +182,7 @@ impl Inner {
                 self.workers.run(Box::new(job)).map_err(Cause::Refused)
             }
             OperationExecutor::Activity(requests, activity) => {
-                let asked = Asked::Operation(*index, args);
+                let asked = CellRequest::Operation(*index, args);
                 let request = OperationJob { cell: cell.clone(), asked, call: Responder(progress), safe };
                 requests.try_send(request).map_err(|_| {
                     Cause::Refused(format!("too many operations wait for the activity `{}`", activity.name))
@@ -197,7 +197,7 @@ impl Inner {
                 } else {
                     self.enter_rested(cell, &progress, deadline)?
                 };
-                self.operate_idle(inside, cell, Asked::Operation(*index, args), Responder(progress))
+                self.operate_idle(inside, cell, CellRequest::Operation(*index, args), Responder(progress))
             }
         }
     }
@@ -226,7 +226,7 @@ impl Inner {
         &self,
         inside: CellGuard<'_>,
         cell: &Arc<Cell>,
-        asked: Asked,
+        asked: CellRequest,
         call: Responder,
     ) -> Result<(), Cause> {
         let (inner, clock, own) = (self.own.clone(), self.clock.clone(), cell.clone());

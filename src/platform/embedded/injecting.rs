@@ -6,7 +6,7 @@ use super::steps::closed;
 use crate::model::{ComponentName, Injection, RunState, Value};
 use crate::runtime::activity::OperationJob;
 use crate::runtime::call::{CallProgress, Reply, Responder};
-use crate::runtime::cell::{Asked, Cell, CellGuard};
+use crate::runtime::cell::{Cell, CellGuard, CellRequest};
 use crate::time::{Time, lock};
 use std::sync::Arc;
 
@@ -54,11 +54,11 @@ impl Inner {
 }
 
 /// What is to be asked of the component; none: it was enough to set a trap.
-fn asked(cell: &Cell, injection: &Injection) -> Result<Option<Asked>, String> {
+fn asked(cell: &Cell, injection: &Injection) -> Result<Option<CellRequest>, String> {
     Ok(Some(match injection {
-        Injection::Hang { operation: None } => Asked::Hang,
-        Injection::Panic => Asked::Panic,
-        Injection::Stall { time } => Asked::Stall(*time),
+        Injection::Hang { operation: None } => CellRequest::Hang,
+        Injection::Panic => CellRequest::Panic,
+        Injection::Stall { time } => CellRequest::Stall(*time),
         Injection::Hang { operation: Some(operation) } => {
             let index = cell.kind.operations.binary_search(operation);
             cell.trap(index.map_err(|_| format!("`{}` has no operation `{operation}`", cell.name))?);
@@ -74,7 +74,7 @@ fn asked(cell: &Cell, injection: &Injection) -> Result<Option<Asked>, String> {
             {
                 return Err(format!("the parameters do not fit `{name}` of `{}`", cell.name));
             }
-            Asked::Injection(index, values.clone())
+            CellRequest::Injection(index, values.clone())
         }
     }))
 }
