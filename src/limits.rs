@@ -3,11 +3,15 @@
 mod asking;
 mod check;
 mod kept;
+mod script;
+mod sweep;
 
 pub use asking::*;
 pub use check::*;
 pub use kept::*;
+pub use script::*;
 use std::time::Duration;
+pub use sweep::*;
 
 /// Frames on a stack before the oldest are squashed into one. Enough for every switch of a session to be undone singly,
 /// small enough that selective undo, which looks at the frames above, stays instant.

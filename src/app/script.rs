@@ -3,28 +3,39 @@
 //! A script is one participant of the clock: in simulated time nothing moves while it computes, so what it asserts is
 //! what it sees. Whatever happens, the deployment it brought up is taken down before the script's end is reported.
 
+mod deploying;
 mod failure;
 mod faults;
+mod figures;
+mod inject;
 mod interrupt;
 mod looks;
 mod options;
+mod parameters;
+mod recordings;
 mod sandbox;
+mod scene;
+mod seen;
 mod values;
+mod waits;
 
-use super::start::Played;
-use super::{Extensions, Refused, StartError};
+use super::{Extensions, Refused};
 use crate::functions::message_within;
 use crate::lang::{LoadOptions, Sources};
 use crate::limits;
 use crate::model::finding::did_you_mean;
 use crate::model::{Ask, ConfigId, Ident};
 use crate::session::tap::LogSink;
-use crate::session::{Ended, Hub, NO_FORWARD, NotNamed, NotUp, Session, Unanswered, recovery};
+use crate::session::{Ended, NO_FORWARD, NotNamed, Session, Unanswered, recovery};
 use crate::time::{Clock, Time};
 use failure::IsRefused;
 pub use failure::ScriptFailure;
+pub use figures::{Figure, digits};
 pub use interrupt::Interrupt;
 use mlua::{FromLua, Lua, Table, Value as LuaValue};
+use options::{OptionFields, force};
+pub use recordings::ScriptSample;
+pub use scene::ScriptScene;
 use std::any::Any;
 use std::cell::RefCell;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -39,7 +50,7 @@ pub struct ScriptOptions {
     pub clock: Clock,
     /// Component libraries and platforms.
     pub extensions: Extensions,
-    /// Parameters for the deployments it loads (`--set`).
+    /// Its parameters, and those of the deployments it loads (`--set`).
     pub load: LoadOptions,
     /// The platform they run on, instead of the one they name.
     pub platform: Option<Ident>,
@@ -63,6 +74,12 @@ pub struct ScriptEnd {
     pub failure: Option<ScriptFailure>,
     /// How its deployment ended, if it had one.
     pub ended: Option<Ended>,
+    /// What was there when it failed, where something was deployed.
+    pub scene: Option<ScriptScene>,
+    /// What it has measured.
+    pub figures: Vec<Figure>,
+    /// What it has recorded.
+    pub samples: Vec<ScriptSample>,
 }
 
 struct ScriptHost {
@@ -78,6 +95,29 @@ struct ScriptHost {
     taken: Vec<u64>,
     refused: Option<(PathBuf, Box<Refused>)>,
     ended: Option<Ended>,
+    looks: seen::ScriptLooks,
+    recordings: recordings::Recordings,
+    figures: Vec<Figure>,
+    injector: Option<inject::Injector>,
+    parameters: parameters::ScriptParameters,
+    /// A parameter was given that nobody reads.
+    unread: Option<String>,
+    /// Faults that were to be injected and were not.
+    not_injected: Vec<String>,
+    /// What was there when the first figure was missed.
+    scene: Option<ScriptScene>,
+}
+
+impl ScriptHost {
+    /// What was up is down, and nobody looks at it any more.
+    fn down(&mut self) {
+        self.recordings.stop();
+        self.not_injected.extend(self.injector.take().map(inject::Injector::end).unwrap_or_default());
+        self.looks = seen::ScriptLooks::default();
+        self.session = None;
+        self.door = None;
+        self.faults.down();
+    }
 }
 
 type SharedHost = Rc<RefCell<ScriptHost>>;
@@ -89,11 +129,15 @@ const RECOVERY: Duration = limits::SCRIPT_RECOVERY;
 pub fn run(path: &Path, options: ScriptOptions) -> ScriptEnd {
     let text = match Sources::Disk.read(path) {
         Ok(text) => text,
-        Err(finding) => return ScriptEnd { failure: Some(ScriptFailure::Unreadable(finding)), ended: None },
+        Err(finding) => {
+            let failure = Some(ScriptFailure::Unreadable(finding));
+            return ScriptEnd { failure, ended: None, scene: None, figures: Vec::new(), samples: Vec::new() };
+        }
     };
     let clock = options.clock.clone();
     let _participant = clock.enter();
     let folder = path.parent().unwrap_or(Path::new("")).to_owned();
+    let parameters = parameters::ScriptParameters::new(&options.load.set);
     let host = Rc::new(RefCell::new(ScriptHost {
         options,
         folder,
@@ -104,6 +148,14 @@ pub fn run(path: &Path, options: ScriptOptions) -> ScriptEnd {
         taken: Vec::new(),
         refused: None,
         ended: None,
+        looks: seen::ScriptLooks::default(),
+        recordings: recordings::Recordings::default(),
+        figures: Vec::new(),
+        injector: None,
+        parameters,
+        unread: None,
+        not_injected: Vec::new(),
+        scene: None,
     }));
     let driven = catch_unwind(AssertUnwindSafe(|| execute(path, text.as_bytes(), &host)));
     // What panicked may have it borrowed, and its Lua state may live on: the session is taken out either way.
@@ -117,12 +169,21 @@ pub fn run(path: &Path, options: ScriptOptions) -> ScriptEnd {
             resume_unwind(panic);
         }
     };
+    // Where it was stopped from outside, where it was then says nothing.
+    let scene = failure.is_some().then(|| interrupt(&host).check().ok().and_then(|()| scene::now(&host))).flatten();
     let mut host = Rc::try_unwrap(host).ok().expect("the Lua state is gone").into_inner();
+    let missed = figures::failure(&host.figures).map(|message| ScriptFailure::Missed { message });
+    let scene = if failure.is_some() { scene } else { host.scene.take() };
     if let Some(session) = host.session.take() {
         host.ended = Some(session.take_down(false));
-        host.door = None;
+        host.down();
     }
-    ScriptEnd { failure, ended: host.ended }
+    let not_injected = host.not_injected.drain(..).next();
+    let not_injected = not_injected.map(|message| ScriptFailure::Lua { message, syntax: false });
+    let unread = host.unread.take().or_else(|| host.parameters.first_unread().filter(|_| failure.is_none()));
+    let unread = unread.map(|message| ScriptFailure::Unread { message });
+    let failure = unread.or(failure).or(not_injected).or(missed);
+    ScriptEnd { failure, ended: host.ended, scene, figures: host.figures, samples: host.recordings.into_all() }
 }
 
 fn execute(path: &Path, text: &[u8], host: &SharedHost) -> Result<(), ScriptFailure> {
@@ -155,6 +216,11 @@ pub const FUNCTIONS: &[&str] = &[
     "commit",
     "drift",
     "recover",
+    "signal",
+    "sample",
+    "expect",
+    "figure",
+    "param",
     "wait",
     "wait_state",
     "wait_answer",
@@ -169,6 +235,7 @@ pub const FUNCTIONS: &[&str] = &[
     "now",
     "say",
     "fault",
+    "inject",
     "fail",
     "shutdown",
 ];
@@ -187,28 +254,29 @@ fn install(lua: &Lua, host: &SharedHost) -> mlua::Result<()> {
             )?;
         }};
     }
-    function!("deploy", (String, Option<Table>), |h, _lua, (file, options)| {
-        deploy(h, &file, options::flag(options, "replay")?)
-    });
+    function!("deploy", (String, Option<Table>), |h, _lua, (file, options)| deploying::deploy(h, &file, options));
     function!("raise", (String, Option<Table>), |h, _lua, (event, options)| {
-        raise(h, &event, options::names(options, "to")?)
+        raise(h, &event, OptionFields::of("raise", options, &["to"])?.names("to")?)
     });
     function!("apply", (String, Option<Table>), |h, _lua, (id, options)| {
-        request(h, Some(&id), Ask::Apply, options::flag(options, "force")?)
+        request(h, Some(&id), Ask::Apply, force("apply", options)?)
     });
     function!("undo", (Option<String>, Option<Table>), |h, _lua, (id, options)| {
-        request(h, id.as_deref(), Ask::UndoOf, options::flag(options, "force")?)
+        request(h, id.as_deref(), Ask::UndoOf, force("undo", options)?)
     });
     function!("set", (String, LuaValue, Option<Table>), |h, _lua, (member, value, options)| {
         let (session, value) = (session(h)?, values::from_lua(&value)?);
+        let options = OptionFields::of("set", options, &["force", "within"])?;
+        let (force, within) = (options.flag("force")?, options.number("within")?);
         listen_anew(h, &session);
-        let set = session.set(LINE, &member, &value, options::flag(options, "force")?);
-        set.map(|_| ()).map_err(|why| error(format!("{}: {}", why.message, why.help)))
+        let set = session.set(LINE, &member, &value, force);
+        let request = set.map_err(|why| error(format!("{}: {}", why.message, why.help)))?;
+        within.map_or(Ok(()), |within| waits::wait_done(h, request, within))
     });
     function!("commit", Option<Table>, |h, _lua, options| {
         let session = session(h)?;
         listen_anew(h, &session);
-        session.request_on(LINE, Ask::Commit { force: options::flag(options, "force")? }, "operator", false);
+        session.request_on(LINE, Ask::Commit { force: force("commit", options)? }, "operator", false);
         Ok(())
     });
     function!("drift", (), |h, lua, ()| {
@@ -224,8 +292,13 @@ fn install(lua: &Lua, host: &SharedHost) -> mlua::Result<()> {
         let (clock, until, interrupt) = (clock(h), deadline(h, seconds)?, interrupt(h));
         interrupt.sleep(&clock, until)
     });
-    function!("wait_state", (String, f64), |h, _lua, (state, seconds)| wait_state(h, &state, seconds));
-    function!("wait_answer", (String, f64), |h, _lua, (event, seconds)| wait_answer(h, &event, seconds));
+    function!("wait_state", (String, f64), |h, _lua, (state, seconds)| waits::wait_state(h, &state, seconds));
+    function!("wait_answer", (String, f64), |h, _lua, (event, seconds)| waits::wait_answer(h, &event, seconds));
+    function!("param", (String, LuaValue), |h, lua, (name, default)| parameters::param(h, lua, &name, default));
+    function!("signal", String, |h, lua, text| seen::signal(h, lua, &text));
+    function!("sample", Table, |h, _lua, table| recordings::sample(h, table));
+    function!("expect", Table, |h, lua, table| figures::add(h, lua, table, true));
+    function!("figure", Table, |h, lua, table| figures::add(h, lua, table, false));
     function!("assert_running", String, |h, _lua, name| looks::assert_state(h, &name, "running"));
     function!("assert_state", (String, String), |h, _lua, (name, state)| looks::assert_state(h, &name, &state));
     function!("state", String, |h, _lua, name| Ok(looks::component_state(h, &name)?.map(|s| s.to_string())));
@@ -248,23 +321,15 @@ fn install(lua: &Lua, host: &SharedHost) -> mlua::Result<()> {
     function!("fault", (String, String, Option<f64>, Option<f64>), |h, _lua, (step, how, times, takes)| {
         h.borrow_mut().faults.add(&step, &how, times, takes)
     });
+    type Injected = (String, String, Option<LuaValue>, Option<f64>);
+    function!("inject", Injected, |h, lua, (component, what, with, at)| {
+        inject::inject(h, lua, &component, &what, with, at)
+    });
     function!("fail", String, |h, _lua, component| {
         session(h)?;
         h.borrow().faults.fail(&component)
     });
-    function!("shutdown", Option<Table>, |h, _lua, options| {
-        let force = options::flag(options, "force")?;
-        let session = session(h)?;
-        let ended = session.take_down(force);
-        let mut host = h.borrow_mut();
-        host.session = None;
-        host.door = None;
-        host.faults.down();
-        let clean = ended.is_clean();
-        let left = ended.left.join(", ");
-        host.ended = Some(ended);
-        if clean { Ok(()) } else { Err(error(format!("the shutdown left something behind: {left}"))) }
-    });
+    function!("shutdown", Option<Table>, |h, _lua, options| deploying::shutdown(h, force("shutdown", options)?));
     // A name that is no function of ours is a typo: say so where it stands, instead of "a nil value".
     let meta = lua.create_table()?;
     meta.set(
@@ -293,6 +358,9 @@ fn interrupt(host: &SharedHost) -> Interrupt {
 
 fn session(host: &SharedHost) -> mlua::Result<Arc<Session>> {
     interrupt(host).check()?;
+    if let Some(why) = host.borrow().injector.as_ref().and_then(inject::Injector::failure) {
+        return Err(error(why));
+    }
     host.borrow().session.clone().ok_or_else(|| error("nothing is deployed: call deploy(\"FILE\") first"))
 }
 
@@ -301,71 +369,6 @@ fn deadline(host: &SharedHost, seconds: f64) -> mlua::Result<Time> {
         return Err(error(format!("{seconds} is not a number of seconds from 0 to 1000000")));
     }
     Ok(clock(host).now() + Duration::from_secs_f64(seconds))
-}
-
-fn deploy(host: &SharedHost, file: &str, replay: bool) -> mlua::Result<()> {
-    interrupt(host).check()?;
-    if host.borrow().session.is_some() {
-        return Err(error("a deployment is already up: call shutdown() before the next deploy"));
-    }
-    let (path, checked) = {
-        let host = host.borrow();
-        let path = host.folder.join(file);
-        let options = &host.options;
-        let read = super::read_for(&path, &options.load, &options.extensions, options.platform);
-        let checked = read.and_then(|read| if replay { super::check_to_replay(read) } else { super::check(read) });
-        (path, checked)
-    };
-    if let Ok(checked) = &checked
-        && replay
-        && (!checked.deployment.kind.imitates || !clock(host).is_simulated())
-    {
-        return Err(error("a way is replayed with `--platform simulated --clock simulated` only"));
-    }
-    let checked = checked.map_err(|refused| {
-        host.borrow_mut().refused = Some((path, Box::new(refused)));
-        mlua::Error::external(IsRefused(file.to_owned()))
-    })?;
-    let clock = clock(host);
-    host.borrow().faults.fit(&checked)?;
-    let played = if replay { Played::Replayed } else { Played::Steered };
-    let started = super::start::start_open(&checked, &clock, played);
-    let (session, simulated) = started.map_err(|e: StartError| error(e.to_string()))?;
-    if !clock.is_simulated() {
-        let door = host.borrow().options.door.as_ref().map(|open| open(&session)).transpose().map_err(error)?;
-        host.borrow_mut().door = door;
-    }
-    host.borrow_mut().faults.up(checked, simulated);
-    if let Some(observer) = &host.borrow().options.observer {
-        session.hub().attach(observer.clone());
-    }
-    interrupt(host).up(&session);
-    // There is nobody who is waited for.
-    if clock.is_simulated() {
-        session.unattended();
-    }
-    // A replay raises the events itself.
-    match if replay { Ok(()) } else { session.bring_up() } {
-        Ok(()) => {
-            let mut host = host.borrow_mut();
-            host.mark = 0;
-            host.taken.clear();
-            host.session = Some(session);
-            Ok(())
-        }
-        Err(NotUp { why, reasons, ended, .. }) => {
-            let mut text = format!("{file} did not come up: {why}");
-            for reason in reasons.iter().chain(&ended.left) {
-                text.push_str("\n  ");
-                text.push_str(reason);
-            }
-            let mut host = host.borrow_mut();
-            host.ended = Some(ended);
-            host.door = None;
-            host.faults.down();
-            Err(error(text))
-        }
-    }
 }
 
 /// The connection that a script is: what it asks for begins one after the other.
@@ -438,61 +441,4 @@ fn recover(host: &SharedHost, how: &str) -> mlua::Result<()> {
         text.push_str(&format!("\n  {difference}"));
     }
     Err(error(text))
-}
-
-/// Waits until `look` finds something; tells what was there instead when the time is over.
-fn wait_until<T>(
-    host: &SharedHost,
-    seconds: f64,
-    look: impl Fn(&Session) -> Option<T>,
-    what: impl Fn(&Hub) -> String,
-) -> mlua::Result<T> {
-    let (session, clock, deadline) = (session(host)?, clock(host), deadline(host, seconds)?);
-    let interrupt = interrupt(host);
-    loop {
-        interrupt.check()?;
-        if let Some(found) = look(&session) {
-            return Ok(found);
-        }
-        if clock.now() >= deadline {
-            return Err(error(what(session.hub())));
-        }
-        session.hub().changed.wait(deadline);
-    }
-}
-
-fn wait_state(host: &SharedHost, state: &str, seconds: f64) -> mlua::Result<()> {
-    let deployed = session(host)?;
-    if !deployed.knows_state(state) {
-        let states = deployed.states();
-        let own = state.rsplit(['.', ':']).next().unwrap_or(state);
-        let help = did_you_mean(own, "states", states.iter().map(String::as_str));
-        return Err(error(format!("the coordinator has no state `{state}`: {help}")));
-    }
-    wait_until(
-        host,
-        seconds,
-        |s| s.in_state(state).then_some(()),
-        |hub| format!("not in `{state}` after {seconds} s: {}", hub.whereabouts()),
-    )
-}
-
-fn wait_answer(host: &SharedHost, event: &str, seconds: f64) -> mlua::Result<()> {
-    if let Some(why) = session(host)?.never_heard(event) {
-        return Err(error(why));
-    }
-    let (mark, taken) = (host.borrow().mark, host.borrow().taken.clone());
-    let number = wait_until(
-        host,
-        seconds,
-        |s| s.hub().heard_but(event, mark, &taken),
-        |hub| {
-            let waiting = hub.outstanding();
-            let waiting =
-                if waiting.is_empty() { String::new() } else { format!("; still waiting for {}", waiting.join(", ")) };
-            format!("`{event}` was not heard in {seconds} s{waiting}")
-        },
-    )?;
-    host.borrow_mut().taken.push(number);
-    Ok(())
 }

@@ -5,7 +5,7 @@ use crate::model::codes::{
     MONITOR_EVENT_TAKEN, MONITOR_NO_SUCH_PART, MONITOR_NOT_A_NUMBER, MONITOR_NOT_RUN, MONITOR_UNHEARD, UNKNOWN_ACTIVITY,
 };
 use crate::model::finding::did_you_mean;
-use crate::model::monitor::{Condition, ConditionKind, MONITORS_TYPE, PortSignal, SignalKind, ValuePart, is_monitors};
+use crate::model::monitor::{Condition, ConditionKind, MONITORS_TYPE, PortSignal, SignalKind, is_monitors};
 use crate::model::statechart::is_internal;
 use crate::model::{
     Change, ComponentName, Deployment, Finding, Findings, Ident, MemberRef, Origin, PortType, ValueType,
@@ -155,54 +155,9 @@ impl MonitorCheck<'_> {
 
 /// What is wrong with the way to a number in a value of that type.
 fn part(signal: &PortSignal, whole: &ValueType) -> Option<Finding> {
-    let mut ty = whole;
-    for step in &signal.path {
-        ty = match (step, ty) {
-            (ValuePart::Field(field), ValueType::Record(fields)) => match fields.iter().find(|(name, _)| name == field)
-            {
-                Some((_, ty)) => ty,
-                None => {
-                    let message = format!("`{}` carries {ty}, which has no field `{field}`", signal.member);
-                    let known = fields.iter().map(|(name, _)| name.as_str());
-                    let help = did_you_mean(field.as_str(), "fields", known);
-                    return Some(Finding::error(MONITOR_NO_SUCH_PART, message).help(help));
-                }
-            },
-            (ValuePart::Index(index), ValueType::Array(element, length)) => {
-                if length.is_some_and(|length| *index >= length) {
-                    let message = format!("`{}` carries {ty}, which has no element {index}", signal.member);
-                    let help = "elements are counted from 0";
-                    return Some(Finding::error(MONITOR_NO_SUCH_PART, message).help(help));
-                }
-                element
-            }
-            (ValuePart::Field(field), _) => {
-                let message = format!("`.{field}` of {ty}, which has no fields");
-                return Some(Finding::error(MONITOR_NO_SUCH_PART, message).help(help_for(signal, ty)));
-            }
-            (ValuePart::Index(index), _) => {
-                let message = format!("`[{index}]` of {ty}, which has no elements");
-                return Some(Finding::error(MONITOR_NO_SUCH_PART, message).help(help_for(signal, ty)));
-            }
-        };
-    }
-    if matches!(ty, ValueType::Bool | ValueType::Int | ValueType::Float) {
-        return None;
-    }
-    let message = format!("`{signal}` is {ty}, which is neither a number nor a bool");
-    Some(Finding::error(MONITOR_NOT_A_NUMBER, message).help(help_for(signal, ty)))
-}
-
-fn help_for(signal: &PortSignal, ty: &ValueType) -> String {
-    match ty {
-        ValueType::Array(..) => format!("name an element, counted from 0: `{signal}[0]`"),
-        ValueType::Record(fields) => {
-            let name = fields.first().map_or("x", |(name, _)| name.as_str());
-            format!("name a field, such as `{signal}.{name}`")
-        }
-        ValueType::Str | ValueType::Event => {
-            "only when it comes can be watched: `age`, `sample_rate` and `silent` take any port".to_owned()
-        }
-        _ => format!("it carries {ty}: write `{}` alone", signal.member),
-    }
+    let (code, wrong) = match signal.part(whole) {
+        Err(wrong) => (MONITOR_NO_SUCH_PART, wrong),
+        Ok(ty) => (MONITOR_NOT_A_NUMBER, signal.is_number(ty).err()?),
+    };
+    Some(Finding::error(code, wrong.message).help(wrong.help))
 }

@@ -200,6 +200,7 @@ pub fn line(out: &Output, entry: &Json, steps: bool) -> String {
         "fault" => {
             format!("{}      {}: {}", out.paint(Style::Bad, "fault"), text(&entry["component"]), text(&entry["reason"]))
         }
+        "injected" => format!("inject     {}: {}", text(&entry["component"]), text(&entry["fault"])),
         "returned" => format!("returned   {}", text(&entry["component"])),
         "missed" => format!(
             "{}     not shown: {}, which came faster than they were read",

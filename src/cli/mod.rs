@@ -14,6 +14,7 @@ mod detach;
 mod drift;
 pub mod exit;
 mod explain;
+mod figures;
 mod graph;
 pub mod input;
 mod keep;
@@ -41,6 +42,7 @@ mod sim_editor;
 mod sim_session;
 mod stack;
 mod status;
+mod sweep;
 mod types;
 mod watch;
 
@@ -98,6 +100,7 @@ commands! {
     Monitor = monitor::Args,
     Deploy = deploy::Args,
     Run = run::Args,
+    Sweep = sweep::Args,
     Shutdown = shutdown::Args,
     List = list::Args,
     Status = status::Args,

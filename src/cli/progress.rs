@@ -208,6 +208,9 @@ impl Screen {
             Happening::Fault { component, reason } => {
                 self.line(format!("{time}  {}  {component}: {reason}", out.paint(Style::Bad, "fault")));
             }
+            Happening::Injected { component, fault } => {
+                self.line(format!("{time}  {}  {component}: {fault}", out.paint(Style::Care, "inject")));
+            }
             Happening::Returned { component } => self.line(format!("{time}  {component} returned and was cleaned up")),
             Happening::Lost { event, reasons } => {
                 self.line(format!("{time}  {}  {event}", out.paint(Style::Bad, "lost")));

@@ -2,6 +2,7 @@
 
 use super::deploy::ClockKind;
 use super::exit::Exit;
+use super::figures;
 use super::input::Parameters;
 use super::last_words;
 use super::output::Style;
@@ -9,23 +10,29 @@ use super::progress::ProgressView;
 use super::signals::{self, SignalWatch};
 use super::{CommandContext, CommandFailure, CommandResult, Run};
 use crate::app::Extensions;
-use crate::app::script::{self, Door, Interrupt, ScriptFailure, ScriptOptions};
+use crate::app::script::{self, Door, Interrupt, ScriptEnd, ScriptFailure, ScriptOptions, ScriptSample};
 use crate::model::Ident;
-use crate::model::codes::{DEPLOY_UNKNOWN_PLATFORM, SCRIPT_FAILED, SCRIPT_SYNTAX};
+use crate::model::codes::{
+    DEPLOY_UNKNOWN_PLATFORM, SCRIPT_FAILED, SCRIPT_MISSED, SCRIPT_SYNTAX, SCRIPT_UNKNOWN_PARAMETER,
+};
 use crate::model::finding::did_you_mean;
 use crate::time::Clock;
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Run a script: deploy, raise events, wait for states and answers with time limits, assert, undo, shut down.
+/// Run a script: deploy, raise events, wait for states and answers with time limits, measure, assert, undo, shut down.
+///
+/// The figures that the script has measured are shown as a table at the end; where one is out of its bounds, the script has
+/// failed. A script that fails also shows where it did: states, frames, and what happened last.
 ///
 /// Whatever the script does or fails to do, the deployment it brought up is shut down before the command ends, in the stages of
 /// `davit shutdown`; so it is at Ctrl-C, which ends the script. On the real clock it has its name while it is up, like one of `davit
 /// deploy`: `davit status` and `davit event` reach it, and `davit shutdown` ends the script, too. The functions a script may call are described in
 /// docs/scripts.md.
 ///
-/// Exit status: 0 it ran to its end; 1 it failed or was interrupted; 2 it cannot be read; 4 what it brought up was shut down
-/// without its coordinator, by force, or incompletely.
+/// Exit status: 0 it ran to its end; 1 it failed, missed a figure or was interrupted; 2 it cannot be read; 4 what it brought up was shut down
+/// without its coordinator, by force, or incompletely. A parameter (`--set`) that neither the script (`param`) nor a deployment of its
+/// reads is 2.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The script.
@@ -39,7 +46,10 @@ pub struct Args {
     platform: Option<String>,
     #[command(flatten)]
     parameters: Parameters,
-    /// Tell only what the script says, and failures.
+    /// Write what the script records into this folder: a file for each recording, as `davit monitor --samples` reads it.
+    #[arg(long, value_name = "DIR")]
+    samples: Option<PathBuf>,
+    /// Tell only what the script says and measures, and failures.
     #[arg(long, short)]
     quiet: bool,
     /// Print every event of the story as one JSON object a line.
@@ -91,6 +101,7 @@ impl Args {
         );
         clock.shutdown();
         progress.finish();
+        measured(context, &progress, &end);
         if let Some(ended) = &end.ended {
             for note in &ended.left {
                 progress.line(format!("{}  {note}", context.out.paint(Style::Bad, "left")));
@@ -99,10 +110,28 @@ impl Args {
         last_words::unread(progress.end());
         drop(watch);
         let stopped = |well| end.ended.as_ref().map_or(well, |ended| Exit::of_stop(ended, well));
-        let Some(failure) = end.failure else { return Ok(stopped(Exit::Done)) };
+        let written = self.samples.map_or(Ok(Exit::Done), |folder| figures::write_samples(&folder, &end.samples));
+        let Some(failure) = end.failure else { return written.map(|_| stopped(Exit::Done)) };
         let mut failure = tell(failure);
         failure.exit = stopped(failure.exit);
         Err(failure)
+    }
+}
+
+/// What the script has measured, and where it failed.
+fn measured(context: &CommandContext, progress: &ProgressView, end: &ScriptEnd) {
+    let out = &context.out;
+    for note in end.samples.iter().filter_map(ScriptSample::note) {
+        progress.line(format!("{}  {note}", out.paint(Style::Care, "note")));
+        progress.json_line(&json!({ "what": "note", "text": note }));
+    }
+    if let Some(scene) = &end.scene {
+        progress.line(figures::scene(out, scene));
+        progress.json_line(&figures::scene_json(scene));
+    }
+    if !end.figures.is_empty() {
+        progress.line(figures::table(out, &end.figures).trim_end());
+        progress.json_line(&json!({ "what": "figures", "figures": end.figures }));
     }
 }
 
@@ -119,7 +148,7 @@ fn door(clock: &Clock) -> Door {
 }
 
 /// A platform of this program.
-fn known(name: &str, extensions: &Extensions) -> Result<Ident, CommandFailure> {
+pub fn known(name: &str, extensions: &Extensions) -> Result<Ident, CommandFailure> {
     let known = extensions.platforms().any(|known| known == name);
     Ident::new(name).ok().filter(|_| known).ok_or_else(|| {
         let help = did_you_mean(name, "platforms", extensions.platforms());
@@ -139,6 +168,16 @@ fn tell(failure: ScriptFailure) -> CommandFailure {
             SCRIPT_FAILED,
             message,
             "what happened before is told above; `--json` tells it to a program",
+        ),
+        ScriptFailure::Unread { message } => CommandFailure::usage(
+            SCRIPT_UNKNOWN_PARAMETER,
+            message,
+            "a script reads one with `param(\"NAME\", DEFAULT)`, before it deploys anything",
+        ),
+        ScriptFailure::Missed { message } => CommandFailure::no(
+            SCRIPT_MISSED,
+            message,
+            "the table of figures has all of them; `--samples DIR` writes down what was recorded",
         ),
         ScriptFailure::Refused { refused, .. } => (*refused).into(),
     }

@@ -9,7 +9,7 @@ use crate::lang;
 use crate::model::codes::CLI_UNKNOWN_TYPE;
 use crate::model::finding::did_you_mean;
 use crate::model::monitor::Condition;
-use crate::model::{Catalogue, ComponentType, Direction, Effect, Tunable};
+use crate::model::{Catalogue, ComponentType, Direction, Effect, GENERIC_INJECTIONS, InjectionParameter, Tunable};
 use std::path::PathBuf;
 
 /// What component types offer: ports, properties, operations, with types, units, limits and what can be undone.
@@ -212,6 +212,25 @@ fn one(out: &Output, ty: &ComponentType) {
         ]);
     }
     section(out, "operations", &table);
+    let mut table = Table::new(2);
+    for [call, doc] in injections(ty) {
+        table.row([out.paint(Style::Name, call), doc]);
+    }
+    section(out, "injections (of scripts, where its code runs in this process)", &table);
+}
+
+/// What can be made to go wrong in a component of the type.
+fn injections(ty: &ComponentType) -> Vec<[String; 2]> {
+    let own = ty.injections.iter().map(|(name, injection)| {
+        let one = |p: &InjectionParameter| {
+            let default = p.default.as_ref().map_or_else(String::new, |value| format!(" = {value}"));
+            format!("{}: {}{default}", p.name, p.ty)
+        };
+        let parameters: Vec<String> = injection.parameters.iter().map(one).collect();
+        [format!("{name}({})", parameters.join(", ")), injection.doc.clone()]
+    });
+    let generic = GENERIC_INJECTIONS.map(|(name, parameters, doc)| [format!("{name}({parameters})"), doc.to_owned()]);
+    own.chain(generic).collect()
 }
 
 fn section(out: &Output, heading: &str, table: &Table) {

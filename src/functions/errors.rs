@@ -71,7 +71,7 @@ pub fn undefined_global(message: &str) -> Option<&str> {
 }
 
 /// Names of the texts that are ours: nobody looks for a mistake there.
-const OURS: [&str; 2] = ["rfsm", "[davit]"];
+const OURS: [&str; 3] = ["rfsm", "[davit]", "__mlua_index"];
 
 /// The innermost place in a stack trace that is not ours: `story.lua:12`.
 fn place(traceback: &str) -> Option<String> {

@@ -793,6 +793,15 @@ codes! {
         "A function of the script raised an error: an assertion that does not hold, a wait whose time is over, a name \
          that does not exist, a deployment that did not come up. The deployment was taken down before the command \
          ended. The functions a script may call are described in docs/scripts.md.";
+    SCRIPT_MISSED = "script::missed", "a figure of the script is out of its bounds",
+        "The script ran to its end, and something that it measured (`expect{ name = …, value = …, max = … }`) is more or less \
+         than it may be, or not a number. Each is told with its line, what it is and what was expected; the table at the end has \
+         all figures, and `where it failed` says what was in force when the first one was missed. Record more (`sample{ … }`, \
+         `davit run SCRIPT --samples DIR`), look at the series, and mend the system or the bound.";
+    SCRIPT_UNKNOWN_PARAMETER = "script::unknown_parameter", "nothing reads the parameter",
+        "`--set NAME=VALUE` gives a parameter to the script, which reads it with `param(\"NAME\", DEFAULT)`, or to the deployments that it \
+         loads, whose Lua files read it by its name. Neither does here: it is misspelt, or the script reads it only after its \
+         `deploy`. Write it as the script does, or read it before.";
     CLI_NOT_RUNNING = "cli::not_running", "there is no such running deployment",
         "The command talks to a running deployment through its control socket, and none of that name (or none at all) \
          answers. Start one with `davit deploy FILE`. Sockets are looked for in $XDG_RUNTIME_DIR/davit: a deployment \

@@ -1,6 +1,7 @@
 //! Component types: what components of a type have and may do.
 
 use super::finding::Origin;
+use super::injection::InjectionType;
 use super::monitor::{Condition, SELF, is_monitors};
 use super::names::{ComponentName, Ident, TypeName};
 use super::run_state::RunState;
@@ -23,6 +24,9 @@ pub struct ComponentType {
     pub properties: BTreeMap<Ident, PropertyType>,
     /// Operations.
     pub operations: BTreeMap<Ident, OperationType>,
+    /// What can be made to go wrong in it, beside what can in every component.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub injections: BTreeMap<Ident, InjectionType>,
     /// Types whose components start before those of this type.
     pub start_after: Vec<TypeName>,
     /// Types whose components stop after those of this type.
@@ -327,6 +331,7 @@ impl ComponentType {
             ports: BTreeMap::new(),
             properties: BTreeMap::new(),
             operations: BTreeMap::new(),
+            injections: BTreeMap::new(),
             start_after: Vec::new(),
             stop_before: Vec::new(),
             actuator: false,

@@ -9,7 +9,9 @@ pub mod embedded;
 pub mod simulated;
 
 pub use crate::model::outcome::{Cause, Execution, Outcome};
-use crate::model::{ActivityStatus, Catalogue, ComponentName, ComponentSnapshot, EventName, Snapshot, Step, Value};
+use crate::model::{
+    ActivityStatus, Catalogue, ComponentName, ComponentSnapshot, EventName, Injection, Snapshot, Step, Value,
+};
 use crate::monitor::{InputSample, MonitorInput};
 use crate::time::{Signal, Time};
 pub use batch::{StepBatch, TimedOutcome, TimedStep};
@@ -161,6 +163,17 @@ pub trait Platform: Send + Sync {
 
     /// From now on events go to `sink` (one sink; the last one set).
     fn subscribe(&self, sink: EventSink);
+
+    /// Has something go wrong in a component at once, as the world would, for scenarios: also in the middle of an operation. Returns
+    /// when it has happened, by `deadline` at the latest.
+    ///
+    /// # Errors
+    /// In words: there is no such component, it does not know this, or it does not come to it. By itself a platform injects
+    /// nothing.
+    fn inject(&self, component: ComponentName, injection: &Injection, deadline: Time) -> Result<(), String> {
+        let _ = (component, injection, deadline);
+        Err("nothing can be injected into components on this platform".to_owned())
+    }
 
     /// Looks at what conditions are about, beside all connections; of ports, at what is written from now on and at nothing
     /// before. Whenever something is written there, `wake` is notified; whoever looks also does so after each step, and

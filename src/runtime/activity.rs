@@ -4,12 +4,12 @@
 //! components, and no lock.
 
 use super::call::{Reply, Responder};
-use super::cell::{Cell, CellGuard};
+use super::cell::{Cell, CellGuard, CellRequest};
 use super::gate::Closed;
 use super::latest::Reader;
 use crate::limits;
 use crate::model::monitor::Counter;
-use crate::model::{Activity as Spec, ActivityStatus, ComponentName, Ident, RunState, Value};
+use crate::model::{Activity as Spec, ActivityStatus, ComponentName, Ident, RunState};
 use crate::time::{Clock, Receiver, Signal, Time};
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
@@ -22,8 +22,7 @@ pub(crate) type Schedule = Arc<[Arc<Cell>]>;
 /// An operation to be run in the activity's thread.
 pub(crate) struct OperationJob {
     pub(crate) cell: Arc<Cell>,
-    pub(crate) operation: usize,
-    pub(crate) args: Vec<Value>,
+    pub(crate) asked: CellRequest,
     pub(crate) call: Responder,
     /// It does not wait until a call that was given up has come to rest.
     pub(crate) safe: bool,
@@ -297,7 +296,7 @@ impl ActivityThread {
     }
 
     fn serve(&self, request: OperationJob) {
-        let OperationJob { cell, operation, args, call, safe } = request;
+        let OperationJob { cell, asked, call, safe } = request;
         let progress = call.0.clone();
         if !progress.begin() {
             return;
@@ -305,7 +304,7 @@ impl ActivityThread {
         self.busy_since.store(self.clock.now().0, Ordering::Release);
         match CellGuard::for_operation(&*cell, safe) {
             Ok(mut inside) => {
-                let mut ended = inside.operation(&self.clock, operation, &args, call);
+                let mut ended = inside.operation(&self.clock, &asked, call);
                 progress.returned();
                 self.leave(&cell, inside, ended.fault.take());
                 ended.answer();

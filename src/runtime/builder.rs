@@ -13,8 +13,8 @@ use super::value::PortValue;
 use crate::model::finding::count;
 use crate::model::monitor::Condition;
 use crate::model::{
-    ComponentType, Direction, Effect, EventName, Ident, OperationType, Origin, PortType, PropertyType, Transition,
-    Tunable, Value, ValueType,
+    ComponentType, Direction, Effect, EventName, GENERIC_INJECTIONS, Ident, InjectionParameter, InjectionType,
+    OperationType, Origin, PortType, PropertyType, Transition, Tunable, Value, ValueType,
 };
 use std::sync::Arc;
 
@@ -36,6 +36,8 @@ pub(crate) struct MemberTable<C> {
     properties: Vec<(Ident, usize)>,
     /// In the order of names; none: runs in the caller's thread.
     pub(crate) operations: Vec<Option<OperationFn<C>>>,
+    /// In the order of names.
+    pub(crate) injections: Vec<OperationFn<C>>,
     pub(crate) hooks: [Option<HookFn<C>>; 4],
 }
 
@@ -50,20 +52,21 @@ pub(crate) fn hook_index(transition: Transition) -> usize {
 
 /// Declares a component's members. Words about one come before it: `b.doc("Force on the tool.").unit("N").input("f")`.
 pub struct Builder<C> {
-    mode: BuilderMode<C>,
+    pub(super) mode: BuilderMode<C>,
 }
 
-enum BuilderMode<C> {
+pub(super) enum BuilderMode<C> {
     Describe(Box<Description<C>>),
     Make(MakingMembers<C>),
 }
 
-struct Description<C> {
+pub(super) struct Description<C> {
     ty: ComponentType,
     words: MemberWords,
     ports: Vec<Ident>,
     properties: Vec<Ident>,
     operations: Vec<(Ident, Option<OperationFn<C>>)>,
+    injections: Vec<(Ident, OperationFn<C>)>,
     hooks: [Option<HookFn<C>>; 4],
 }
 
@@ -79,9 +82,10 @@ pub(super) struct MemberWords {
     pub(super) effect: Option<Effect>,
     pub(super) moves: bool,
     pub(super) settled_by: Option<Condition>,
+    pub(super) parameters: Vec<InjectionParameter>,
 }
 
-struct MakingMembers<C> {
+pub(super) struct MakingMembers<C> {
     table: Arc<MemberTable<C>>,
     beat: Arc<Beat>,
     values: Vec<Value>,
@@ -112,6 +116,7 @@ impl<C: Component> Builder<C> {
             ports: Vec::new(),
             properties: Vec::new(),
             operations: Vec::new(),
+            injections: Vec::new(),
             hooks: [None; 4],
         };
         let mut builder = Self { mode: BuilderMode::Describe(Box::new(description)) };
@@ -123,6 +128,7 @@ impl<C: Component> Builder<C> {
             order.iter().map(|n| (*n, sorted.binary_search(n).expect("declared"))).collect::<Vec<_>>()
         };
         d.operations.sort_by_key(|(name, _)| *name);
+        d.injections.sort_by_key(|(name, _)| *name);
         for operation in d.ty.operations.values() {
             if let Effect::Undo(undo) = &operation.effect {
                 assert!(d.ty.operations.contains_key(undo), "{name}: there is no operation `{undo}` to undo another");
@@ -132,6 +138,7 @@ impl<C: Component> Builder<C> {
             ports: indexed(&d.ports, &ports),
             properties: indexed(&d.properties, &properties),
             operations: d.operations.into_iter().map(|(_, f)| f).collect(),
+            injections: d.injections.into_iter().map(|(_, f)| f).collect(),
             hooks: d.hooks,
         };
         (d.ty, table)
@@ -360,6 +367,18 @@ impl<C: Component> Builder<C> {
 }
 
 impl<C> Description<C> {
+    pub(super) fn injection(&mut self, name: &str, types: &[ValueType], f: OperationFn<C>) {
+        let words = std::mem::take(&mut self.words);
+        let (name, of) = (ident(name), &self.ty.name);
+        let generic = GENERIC_INJECTIONS.iter().any(|(generic, ..)| *generic == name.as_str());
+        assert!(!generic, "{of}: every component has the injection `{name}`");
+        let declared = words.parameters.iter().map(|parameter| &parameter.ty);
+        assert!(declared.eq(types), "{of}: the parameters of `{name}` are not what its function takes");
+        let injection = InjectionType { parameters: words.parameters, doc: words.doc };
+        assert!(self.ty.injections.insert(name, injection).is_none(), "{of}: `{name}` is declared twice");
+        self.injections.push((name, f));
+    }
+
     fn port(&mut self, name: &str, direction: Direction, ty: ValueType) {
         let words = std::mem::take(&mut self.words);
         let name = ident(name);

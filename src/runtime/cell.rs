@@ -8,8 +8,28 @@ use super::guard;
 use super::library::{Body, ComponentFactory};
 use crate::model::{ComponentName, RunState, Transition, Value};
 use crate::time::{Clock, Time};
+use std::panic::resume_unwind;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::Ordering::{AcqRel, Relaxed};
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::time::Duration;
+
+/// What is asked of a component that somebody enters.
+pub(crate) enum CellRequest {
+    /// An operation, by its index, with its arguments.
+    Operation(usize, Vec<Value>),
+    /// An injection that its type declares, by its index, with its values.
+    Injection(usize, Vec<Value>),
+    /// Not to return any more.
+    Hang,
+    /// To panic.
+    Panic,
+    /// To take so long.
+    Stall(Duration),
+}
+
+/// No operation has this index.
+const UNTRAPPED: usize = usize::MAX;
 
 /// A component and its gate.
 pub(crate) struct Cell {
@@ -18,6 +38,8 @@ pub(crate) struct Cell {
     pub(crate) beat: Arc<Beat>,
     /// The component; none: it was taken out for good.
     pub(crate) gate: Gate<Option<Box<dyn Body>>>,
+    /// The operation that does not return when it is called next; `UNTRAPPED`: none.
+    trap: AtomicUsize,
     /// The release (or, event-driven, the moment) of the last update since the last start; `NEVER`: none yet.
     last: AtomicU64,
 }
@@ -37,7 +59,13 @@ pub(crate) type CellGuard<'a> = gate::GateGuard<'a, Cell>;
 
 impl Cell {
     pub(crate) fn new(kind: Arc<ComponentFactory>, beat: Arc<Beat>, body: Box<dyn Body>) -> Self {
-        Self { name: beat.name, kind, beat, gate: Gate::new(Some(body)), last: AtomicU64::new(Time::NEVER.0) }
+        let trap = AtomicUsize::new(UNTRAPPED);
+        Self { name: beat.name, kind, beat, gate: Gate::new(Some(body)), trap, last: AtomicU64::new(Time::NEVER.0) }
+    }
+
+    /// The next call of that operation does not return.
+    pub(crate) fn trap(&self, operation: usize) {
+        self.trap.store(operation, Ordering::Release);
     }
 
     pub(crate) fn state(&self) -> RunState {
@@ -123,8 +151,8 @@ impl CellGuard<'_> {
     }
 
     /// Calls an operation. Its answer is sent by [`CallEnded::answer`], after leaving: who hears it may call again at once.
-    pub(crate) fn operation(&mut self, clock: &Clock, index: usize, args: &[Value], call: Responder) -> CallEnded {
-        self.with(|cell, body| operate(cell, body.as_mut(), clock, index, args, call))
+    pub(crate) fn operation(&mut self, clock: &Clock, asked: &CellRequest, call: Responder) -> CallEnded {
+        self.with(|cell, body| operate(cell, body.as_mut(), clock, asked, call))
     }
 }
 
@@ -132,8 +160,7 @@ fn operate(
     cell: &Cell,
     body: Option<&mut Box<dyn Body>>,
     clock: &Clock,
-    index: usize,
-    args: &[Value],
+    asked: &CellRequest,
     call: Responder,
 ) -> CallEnded {
     cell.beat.set_now(clock.now());
@@ -141,7 +168,26 @@ fn operate(
     let mut cx = Context::of_call(clock, &cell.beat, call);
     let result = match body {
         None => Ok(Some(Reply::Refused("the component is gone".to_owned()))),
-        Some(body) => guard::call(|| body.operation(index, args, &mut cx)),
+        Some(body) => guard::call(|| match asked {
+            CellRequest::Operation(index, _)
+                if cell.trap.compare_exchange(*index, UNTRAPPED, AcqRel, Relaxed).is_ok() =>
+            {
+                clock.hang()
+            }
+            CellRequest::Operation(index, args) => body.operation(*index, args, &mut cx),
+            CellRequest::Injection(index, values) => body.inject(*index, values, &mut cx),
+            CellRequest::Hang | CellRequest::Panic | CellRequest::Stall(_) => {
+                // It has happened now, whatever comes of it.
+                to.answer(Reply::Done(None));
+                match asked {
+                    CellRequest::Hang => clock.hang(),
+                    CellRequest::Stall(time) => clock.sleep(*time),
+                    // It is no defect of the place it comes from.
+                    _ => resume_unwind(Box::new("a panic was injected".to_owned())),
+                }
+                Some(Reply::Done(None))
+            }
+        }),
     };
     let call = cx.take_call();
     let (reply, fault) = match result {

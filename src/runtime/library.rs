@@ -14,6 +14,8 @@ pub(crate) trait Body: Send {
     fn hook(&mut self, transition: Transition, cx: &mut Context) -> HookResult;
     /// Calls the operation of that index; none: it will answer by its ticket.
     fn operation(&mut self, index: usize, args: &[Value], cx: &mut Context) -> Option<Reply>;
+    /// Has the injection of that index happen.
+    fn inject(&mut self, index: usize, values: &[Value], cx: &mut Context) -> Option<Reply>;
 }
 
 struct Typed<C> {
@@ -37,6 +39,13 @@ impl<C: Component> Body for Typed<C> {
         match self.table.operations.get(index) {
             Some(Some(f)) => f(&mut self.component, cx, args),
             _ => Some(Reply::Refused("there is no such operation here".to_owned())),
+        }
+    }
+
+    fn inject(&mut self, index: usize, values: &[Value], cx: &mut Context) -> Option<Reply> {
+        match self.table.injections.get(index) {
+            Some(f) => f(&mut self.component, cx, values),
+            None => Some(Reply::Refused("there is no such injection here".to_owned())),
         }
     }
 }

@@ -1,9 +1,11 @@
 //! The words of a declaration: what is said about a component type, and about the member that comes next.
 
-use super::builder::{Builder, ident};
-use super::component::Component;
+use super::builder::{Builder, BuilderMode, OperationFn, ident};
+use super::call::Reply;
+use super::component::{Arguments, Component, Context, HookResult};
+use super::value::PortValue;
 use crate::model::monitor::Condition;
-use crate::model::{Effect, Irreversible, Tunable, TypeName};
+use crate::model::{Effect, InjectionParameter, Irreversible, Tunable, TypeName};
 use std::ops::RangeInclusive;
 use std::sync::Arc;
 
@@ -106,6 +108,53 @@ impl<C: Component> Builder<C> {
     /// Calling the operation moves hardware: an automatic rollback does not do it unasked.
     pub fn moves(&mut self) -> &mut Self {
         self.words(|w| w.moves = true)
+    }
+
+    /// A parameter of the injection that comes next, which takes them in this order; without a default it must be given.
+    pub fn parameter<T: PortValue>(&mut self, name: &str, default: Option<T>) -> &mut Self {
+        let name = ident(name);
+        let default = default.map(|value| value.to_value());
+        self.words(|w| w.parameters.push(InjectionParameter { name, ty: T::value_type(), default }))
+    }
+
+    /// Something that can be made to go wrong in the component, at any moment, in the middle of an operation too: a fault of
+    /// the hardware behind it. A scenario asks for it by name, `inject("drive", "overcurrent", { joint = 2 })`, with a value for each
+    /// [parameter](Self::parameter); `davit types` shows it. It happens in the component's own activity between two updates, on a
+    /// worker while it does not run. What it answers says whether it could be made to happen.
+    ///
+    /// ```
+    /// # use davit::component::{Builder, Component, Failure};
+    /// struct Drive { hot: [bool; 3] }
+    ///
+    /// impl Component for Drive {
+    ///     fn new(b: &mut Builder<Self>) -> Self {
+    ///         b.doc("A motor is too hot.").parameter("joint", Some(0_usize)).injection("overtemp", |c, _, (joint,): (usize,)| {
+    ///             *c.hot.get_mut(joint).ok_or(Failure("there are joints 0 to 2".to_owned()))? = true;
+    ///             Ok(())
+    ///         });
+    ///         Self { hot: [false; 3] }
+    ///     }
+    /// }
+    /// # assert_eq!(davit::component::Library::new("mine").with::<Drive>("Drive").catalogue().iter().next().unwrap().injections.len(), 1);
+    /// ```
+    ///
+    /// # Panics
+    /// When the parameters declared before it are not of the types that the function takes.
+    pub fn injection<A: Arguments>(
+        &mut self,
+        name: &str,
+        f: impl Fn(&mut C, &mut Context, A) -> HookResult + Send + Sync + 'static,
+    ) -> &mut Self {
+        if let BuilderMode::Describe(d) = &mut self.mode {
+            let erased: OperationFn<C> = Box::new(move |component, cx, values| {
+                let Some(values) = A::from_values(values) else {
+                    return Some(Reply::Refused("a parameter does not fit".to_owned()));
+                };
+                Some(f(component, cx, values).map_or_else(|why| Reply::Failed(why.0), |()| Reply::Done(None)))
+            });
+            d.injection(name, &A::types(), erased);
+        }
+        self
     }
 
     /// What is true of the component once the operation was done: a call of which no answer came is settled by it. The

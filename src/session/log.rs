@@ -74,6 +74,13 @@ pub enum Happening {
         /// How.
         reason: String,
     },
+    /// A scenario has something go wrong in a component.
+    Injected {
+        /// Which.
+        component: String,
+        /// What.
+        fault: String,
+    },
     /// A component whose call had not returned came back and was cleaned up.
     Returned {
         /// Which.

@@ -1,17 +1,18 @@
 //! One property or port of a running deployment: what it is worth, and an operator's change of it.
 
+use super::carried::shown;
 use super::{Session, Unanswered};
 use crate::limits;
 use crate::model::finding::did_you_mean;
-use crate::model::monitor::{PortSignal, ValuePart};
+use crate::model::monitor::PortSignal;
 use crate::model::{
     Ask, ChangeKind, ComponentName, ComponentType, ConfigId, Configuration, Direction, Ident, MemberRef, OperatorMay,
     RequestId, Value, ValueType,
 };
-use crate::monitor::{InputSample, MonitorInput};
 use crate::time::lock;
 use serde::Serialize;
 use serde_json::Value as Json;
+use std::cell::RefCell;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -62,15 +63,15 @@ pub struct NoMember {
     pub help: String,
 }
 
-fn no(message: impl Into<String>, help: impl Into<String>) -> NoMember {
+pub(super) fn no(message: impl Into<String>, help: impl Into<String>) -> NoMember {
     NoMember { message: message.into(), help: help.into() }
 }
 
 /// A member that is there.
-struct FoundMember {
-    member: MemberRef,
-    kind: MemberKind,
-    ty: ValueType,
+pub(super) struct FoundMember {
+    pub member: MemberRef,
+    pub kind: MemberKind,
+    pub ty: ValueType,
     unit: Option<Arc<str>>,
 }
 
@@ -146,7 +147,7 @@ impl Session {
     }
 
     /// Of a component that is there.
-    fn member(&self, name: &str) -> Result<FoundMember, NoMember> {
+    pub(super) fn member(&self, name: &str) -> Result<FoundMember, NoMember> {
         // Asked before it becomes a name: names are kept for ever.
         let (of, member) = name
             .split_once('.')
@@ -173,66 +174,16 @@ impl Session {
 
     /// The next that goes through a port.
     fn sample(&self, member: MemberRef, ty: &ValueType, within: Duration) -> Result<(Json, f64), String> {
-        let unseen = || format!("what goes through a port of the type {ty} is not shown");
-        let parts = parts(ty).filter(|parts| parts.len() <= limits::GET_PARTS).ok_or_else(unseen)?;
-        let inputs: Vec<MonitorInput> =
-            parts.into_iter().map(|path| MonitorInput::Port(PortSignal { member, path })).collect();
-        let samples = self.samples(&inputs, within).ok_or("this platform does not show what goes through ports")?;
-        if !samples.iter().all(|sample| sample.present) {
-            return Err(format!("nothing went through it in {} s", within.as_secs_f64()));
-        }
-        let at = samples.iter().map(|sample| sample.at).max().unwrap_or_default().as_secs_f64();
-        Ok((assembled(ty, &mut samples.iter()), at))
+        let look = RefCell::new(self.look_at(&PortSignal::whole(member), ty)?);
+        let seen = self.hub().wait_outside(within, |hub| look.borrow_mut().seen(hub.now()));
+        let (value, at) = seen.ok_or_else(|| format!("nothing went through it in {} s", within.as_secs_f64()))?;
+        Ok((shown(&value), at.as_secs_f64()))
     }
 }
 
 fn unknown(component: ComponentName, member: &str, ty: &ComponentType) -> NoMember {
     let known = ty.properties.keys().chain(ty.ports.keys()).map(Ident::as_str);
     no(format!("`{component}` has no property or port `{member}`"), did_you_mean(member, "properties and ports", known))
-}
-
-/// The ways to all numbers in a value of a type; none: there may be anything in it.
-fn parts(ty: &ValueType) -> Option<Vec<Vec<ValuePart>>> {
-    let below = |step: ValuePart, ty: &ValueType| -> Option<Vec<Vec<ValuePart>>> {
-        let under = |path: Vec<ValuePart>| std::iter::once(step).chain(path).collect();
-        Some(parts(ty)?.into_iter().map(under).collect())
-    };
-    match ty {
-        ValueType::Bool | ValueType::Int | ValueType::Float => Some(vec![Vec::new()]),
-        ValueType::Array(element, Some(length)) if *length <= limits::GET_PARTS => {
-            let each = (0..*length).map(|at| below(ValuePart::Index(at), element)).collect::<Option<Vec<_>>>()?;
-            Some(each.concat())
-        }
-        ValueType::Record(fields) => {
-            let each =
-                fields.iter().map(|(name, ty)| below(ValuePart::Field(*name), ty)).collect::<Option<Vec<_>>>()?;
-            Some(each.concat())
-        }
-        _ => None,
-    }
-}
-
-/// The value of that type whose numbers these are.
-fn assembled<'a>(ty: &ValueType, numbers: &mut impl Iterator<Item = &'a InputSample>) -> Json {
-    match ty {
-        ValueType::Array(element, length) => {
-            (0..length.unwrap_or_default()).map(|_| assembled(element, numbers)).collect()
-        }
-        ValueType::Record(fields) => {
-            fields.iter().map(|(name, ty)| (name.to_string(), assembled(ty, numbers))).collect()
-        }
-        _ => {
-            let number = numbers.next().map_or(f64::NAN, |sample| sample.value);
-            match ty {
-                ValueType::Bool => (number != 0.0).into(),
-                #[allow(clippy::cast_possible_truncation)]
-                ValueType::Int => (number as i64).into(),
-                // JSON has no number for it, and null would be no value.
-                _ if !number.is_finite() => number.to_string().to_lowercase().into(),
-                _ => number.into(),
-            }
-        }
-    }
 }
 
 /// A value as JSON has it.
@@ -253,19 +204,4 @@ fn value_of(json: &Json) -> Result<Value, String> {
             Value::Record(fields.iter().map(field).collect::<Result<_, String>>()?)
         }
     })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::time::Time;
-
-    #[test]
-    fn what_is_not_finite_is_told_as_text() {
-        let sample = |value| InputSample { value, at: Time(0), writes: 1, present: true };
-        let samples = [1.5, f64::INFINITY, f64::NEG_INFINITY, f64::NAN].map(sample);
-        let ty = ValueType::Array(Box::new(ValueType::Float), Some(4));
-        let seen = assembled(&ty, &mut samples.iter());
-        assert_eq!(seen, serde_json::json!([1.5, "inf", "-inf", "nan"]));
-    }
 }

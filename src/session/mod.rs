@@ -4,6 +4,7 @@
 //! other, and its answers become events. The thread that calls [`Session::bring_up`], [`Session::serve`] and
 //! [`Session::take_down`] drives the deployment's life; everybody else only leaves requests and commands.
 
+pub mod carried;
 pub mod client;
 mod connection;
 mod doors;
@@ -20,6 +21,7 @@ pub mod owner;
 mod parts;
 pub mod place;
 mod raising;
+pub mod recording;
 mod recovery;
 mod routes;
 pub mod rpc;

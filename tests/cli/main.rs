@@ -27,12 +27,14 @@ mod monitor;
 mod motion;
 mod recovery;
 mod resting;
+mod scripts;
 mod setting;
 mod several;
 mod simulated;
 mod small;
 mod stalled;
 mod stopping;
+mod sweeping;
 mod together;
 #[path = "../lang/tongue.rs"]
 mod tongue;

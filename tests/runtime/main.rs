@@ -6,6 +6,7 @@ mod calls;
 mod cancelling;
 mod conformance;
 mod flow;
+mod injecting;
 mod monitors;
 #[path = "../support/names.rs"]
 mod names;

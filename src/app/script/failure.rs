@@ -18,6 +18,18 @@ pub enum ScriptFailure {
         /// Whether it is the text that is wrong.
         syntax: bool,
     },
+    /// A parameter was given that neither it nor a deployment of its reads.
+    #[error("{message}")]
+    Unread {
+        /// Which.
+        message: String,
+    },
+    /// It ran to its end, and figures of it are out of their bounds; the text names file and line of each.
+    #[error("{message}")]
+    Missed {
+        /// Which.
+        message: String,
+    },
     /// A deployment it loads is refused.
     #[error("{path} is refused")]
     Refused {

@@ -6,9 +6,10 @@ use crate::app::start::rule;
 use crate::check;
 use crate::limits;
 use crate::model::finding::did_you_mean;
-use crate::model::{ComponentName, Direction, FaultKind, Ident, Origin, StepFault, TypeName};
+use crate::model::{ComponentName, ComponentType, Direction, FaultKind, Ident, Origin, StepFault, TypeName};
 use crate::platform::simulated::Simulated;
 use std::collections::BTreeSet;
+use std::sync::Arc;
 use std::time::Duration;
 
 /// What a script lets go wrong.
@@ -87,6 +88,15 @@ impl ScriptFaults {
         let known = self.up.as_ref().and_then(|(checked, _)| checked.catalogue.get(ty));
         let ports = known.iter().flat_map(|ty| &ty.ports);
         ports.filter(|(_, port)| port.direction == Direction::In).map(|(name, _)| *name).collect()
+    }
+
+    /// The components that configurations of the deployment that is up create, each with its type, or types.
+    pub(super) fn created(&self) -> Vec<(ComponentName, Arc<ComponentType>)> {
+        let Some((checked, _)) = &self.up else { return Vec::new() };
+        let changes = checked.deployment.configurations.iter().flat_map(|c| &c.changes);
+        let made = changes.filter_map(|change| change.kind.makes());
+        let typed = made.filter_map(|(component, ty, _)| Some((component, checked.catalogue.get(ty)?.clone())));
+        typed.collect()
     }
 
     /// A deployment is about to be brought up; what waited for it is in force.

@@ -10,7 +10,7 @@ use crate::platform::{Cause, PlatformEvent};
 use crate::runtime::activity::{ActivityThread, OperationJob};
 use crate::runtime::builder::CallerFn;
 use crate::runtime::call::{CallProgress, Reply, Responder};
-use crate::runtime::cell::{Cell, CellGuard};
+use crate::runtime::cell::{Cell, CellGuard, CellRequest};
 use crate::runtime::gate::Closed;
 use crate::runtime::guard;
 use crate::time::{Receiver, RecvError, Sender, Time, lock};
@@ -182,8 +182,8 @@ impl Inner {
                 self.workers.run(Box::new(job)).map_err(Cause::Refused)
             }
             OperationExecutor::Activity(requests, activity) => {
-                let request =
-                    OperationJob { cell: cell.clone(), operation: *index, args, call: Responder(progress), safe };
+                let asked = CellRequest::Operation(*index, args);
+                let request = OperationJob { cell: cell.clone(), asked, call: Responder(progress), safe };
                 requests.try_send(request).map_err(|_| {
                     Cause::Refused(format!("too many operations wait for the activity `{}`", activity.name))
                 })?;
@@ -197,7 +197,7 @@ impl Inner {
                 } else {
                     self.enter_rested(cell, &progress, deadline)?
                 };
-                self.operate_idle(inside, cell, *index, args, Responder(progress))
+                self.operate_idle(inside, cell, CellRequest::Operation(*index, args), Responder(progress))
             }
         }
     }
@@ -222,12 +222,11 @@ impl Inner {
     }
 
     /// Calls an operation of a component that does not run, on a worker.
-    fn operate_idle(
+    pub(super) fn operate_idle(
         &self,
         inside: CellGuard<'_>,
         cell: &Arc<Cell>,
-        index: usize,
-        args: Vec<Value>,
+        asked: CellRequest,
         call: Responder,
     ) -> Result<(), Cause> {
         let (inner, clock, own) = (self.own.clone(), self.clock.clone(), cell.clone());
@@ -239,7 +238,7 @@ impl Inner {
             if !progress.begin() {
                 return;
             }
-            let mut ended = inside.operation(&clock, index, &args, call);
+            let mut ended = inside.operation(&clock, &asked, call);
             progress.returned();
             let left = inside.leave(ended.fault.is_some().then_some(RunState::Faulted));
             if let Some(reason) = ended.fault.take() {

@@ -4,6 +4,7 @@
 //!   ports and properties.
 //! * [`steps`]: the steps that are immediate. [`step_sequence`], [`calls`]: those that run a component's own code, on workers under
 //!   a deadline; [`under_way`]: how they are given up; [`workers`]: their threads.
+//! * [`injecting`]: faults that a scenario puts into components.
 //! * [`watchers`]: the probes by which monitors and conditions look at components. [`prepared`]: fixed lists of immediate steps.
 //!   [`order`]: the data-flow order.
 //!
@@ -22,6 +23,7 @@
 
 mod activities;
 mod calls;
+mod injecting;
 mod order;
 mod others;
 mod prepared;
@@ -36,8 +38,8 @@ mod workers;
 use super::{EventSink, Execution, ObserveError, Outcome, Platform, PlatformEvent, Prepared, StepBatch, Watch};
 use crate::limits;
 use crate::model::{
-    Activity as Spec, ActivityStatus, Catalogue, ComponentName, ComponentSnapshot, Ident, Origin, Snapshot, Step,
-    Transition, TypeName,
+    Activity as Spec, ActivityStatus, Catalogue, ComponentName, ComponentSnapshot, Ident, Injection, Origin, Snapshot,
+    Step, Transition, TypeName,
 };
 use crate::monitor::MonitorInput;
 use crate::runtime::{ComponentFactory, Libraries, Notice, Notices, guard};
@@ -194,6 +196,10 @@ impl Platform for EmbeddedPlatform {
 
     fn watch(&self, inputs: &[MonitorInput], wake: &Signal) -> Option<Box<dyn Watch>> {
         Some(Box::new(watchers::ProbeWatch::new(&self.inner, inputs, wake)))
+    }
+
+    fn inject(&self, component: ComponentName, injection: &Injection, deadline: Time) -> Result<(), String> {
+        self.inner.inject(component, injection, deadline)
     }
 
     fn subscribe(&self, sink: EventSink) {

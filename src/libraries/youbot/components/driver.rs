@@ -7,7 +7,7 @@ use crate::libraries::youbot::parameters::{GEAR, GRIPPER, JOINTS, PARK_POSE_DEG,
 use crate::libraries::youbot::plant::ArmPlant;
 use crate::libraries::youbot::rigid_body::{ArmModel, J5, radians};
 use crate::model::{EventName, Tunable};
-use crate::runtime::{Builder, Component, Context, EventOut, In, OperationAnswer, Out, Prop, Ticket};
+use crate::runtime::{Builder, Component, Context, EventOut, Failure, In, OperationAnswer, Out, Prop, Ticket};
 use nalgebra::Vector3;
 
 /// Falling by more than this when the drives go off is dropping the arm, in m.
@@ -30,6 +30,15 @@ const FAULTS: [(&str, &str, i64); 5] = [
     ("ec_timeout", "e_EC_TIMEOUT", 0x40),
     ("encoder", "e_ENCODER_ERR", 0x20),
     ("emergency", "e_EMERGENCY_STOP", 0x80),
+];
+
+/// What each of them is, for `davit types`.
+const FAULT_WORDS: [&str; FAULTS.len()] = [
+    "A motor takes too much current; the drives hold, e_OVERCURRENT.",
+    "A motor is too hot; the drives hold, e_OVERTEMP.",
+    "The field bus did not answer in time; the drives hold, e_EC_TIMEOUT.",
+    "An encoder tells nonsense; the drives hold, e_ENCODER_ERR.",
+    "Somebody pressed the emergency stop; the drives hold, e_EMERGENCY_STOP.",
 ];
 
 struct Events {
@@ -182,6 +191,13 @@ impl Component for Driver {
                 OperationAnswer::Done(())
             },
         );
+        for (fault, what) in FAULTS.iter().zip(FAULT_WORDS) {
+            let name = fault.0;
+            b.doc(what).injection(name, move |c, _, (): ()| match c.fail(name) {
+                true => Ok(()),
+                false => Err(Failure(format!("no fault `{name}`"))),
+            });
+        }
         let p = DriveParameters::default();
         Self {
             effort: b.doc("Torques, heard in mode 6.").unit("N m").input("joint_effort_command"),

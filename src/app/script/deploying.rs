@@ -1,0 +1,95 @@
+//! `deploy(file)`: checked, brought up, and known to whoever may stop or steer it.
+
+use super::failure::IsRefused;
+use super::options::OptionFields;
+use super::{SharedHost, clock, error, interrupt};
+use crate::app::start::Played;
+use crate::app::{StartError, check, check_to_replay, read_for, start};
+use crate::lang::LoadOptions;
+use crate::session::NotUp;
+use mlua::Table;
+
+pub(super) fn deploy(host: &SharedHost, file: &str, options: Option<Table>) -> mlua::Result<()> {
+    let replay = OptionFields::of("deploy", options, &["replay"])?.flag("replay")?;
+    interrupt(host).check()?;
+    if host.borrow().session.is_some() {
+        return Err(error("a deployment is already up: call shutdown() before the next deploy"));
+    }
+    let (path, checked) = {
+        let mut host = host.borrow_mut();
+        let path = host.folder.join(file);
+        let set = host.parameters.for_deployments();
+        let options = &host.options;
+        let load = LoadOptions { set, ..options.load.clone() };
+        let read = read_for(&path, &load, &options.extensions, options.platform);
+        let checked = read.and_then(|read| if replay { check_to_replay(read) } else { check(read) });
+        (path, checked)
+    };
+    if let Ok(checked) = &checked
+        && replay
+        && (!checked.deployment.kind.imitates || !clock(host).is_simulated())
+    {
+        return Err(error("a way is replayed with `--platform simulated --clock simulated` only"));
+    }
+    let checked = checked.map_err(|refused| {
+        let unread = host.borrow().parameters.refused(&refused);
+        if let Some(unread) = unread {
+            host.borrow_mut().unread = Some(unread.clone());
+            return error(unread);
+        }
+        host.borrow_mut().refused = Some((path, Box::new(refused)));
+        mlua::Error::external(IsRefused(file.to_owned()))
+    })?;
+    let clock = clock(host);
+    host.borrow().faults.fit(&checked)?;
+    let played = if replay { Played::Replayed } else { Played::Steered };
+    let started = start::start_open(&checked, &clock, played);
+    let (session, simulated) = started.map_err(|e: StartError| error(e.to_string()))?;
+    if !clock.is_simulated() {
+        let door = host.borrow().options.door.as_ref().map(|open| open(&session)).transpose().map_err(error)?;
+        host.borrow_mut().door = door;
+    }
+    host.borrow_mut().faults.up(checked, simulated);
+    if let Some(observer) = &host.borrow().options.observer {
+        session.hub().attach(observer.clone());
+    }
+    interrupt(host).up(&session);
+    // There is nobody who is waited for.
+    if clock.is_simulated() {
+        session.unattended();
+    }
+    // A replay raises the events itself.
+    match if replay { Ok(()) } else { session.bring_up() } {
+        Ok(()) => {
+            let mut host = host.borrow_mut();
+            host.mark = 0;
+            host.taken.clear();
+            host.session = Some(session);
+            Ok(())
+        }
+        Err(NotUp { why, reasons, ended, .. }) => {
+            let mut text = format!("{file} did not come up: {why}");
+            for reason in reasons.iter().chain(&ended.left) {
+                text.push_str("\n  ");
+                text.push_str(reason);
+            }
+            let mut host = host.borrow_mut();
+            host.ended = Some(ended);
+            host.door = None;
+            host.faults.down();
+            Err(error(text))
+        }
+    }
+}
+
+/// Takes down what is up.
+pub(super) fn shutdown(host: &SharedHost, force: bool) -> mlua::Result<()> {
+    let session = super::session(host)?;
+    let ended = session.take_down(force);
+    let mut host = host.borrow_mut();
+    host.down();
+    let clean = ended.is_clean();
+    let left = ended.left.join(", ");
+    host.ended = Some(ended);
+    if clean { Ok(()) } else { Err(error(format!("the shutdown left something behind: {left}"))) }
+}

@@ -1,0 +1,80 @@
+//! Faults that are put straight into a component, at any moment: as what is asked of it, they go in between two updates, and
+//! wait for no call that was given up.
+
+use super::Inner;
+use super::steps::closed;
+use crate::model::{ComponentName, Injection, RunState, Value};
+use crate::runtime::activity::OperationJob;
+use crate::runtime::call::{CallProgress, Reply, Responder};
+use crate::runtime::cell::{Cell, CellGuard, CellRequest};
+use crate::time::{Time, lock};
+use std::sync::Arc;
+
+impl Inner {
+    /// Has it happen; returns when it has, at most by the deadline.
+    pub(super) fn inject(&self, name: ComponentName, injection: &Injection, deadline: Time) -> Result<(), String> {
+        let (reply, replied) = self.clock.channel(1);
+        let call = Responder(Arc::new(CallProgress::new(reply, None, None)));
+        let (cell, running) = {
+            let registry = lock(&self.registry);
+            let slot = registry.find(name).map_err(|cause| cause.to_string())?;
+            let entry = registry.entry(slot);
+            if let Injection::Hang { operation: Some(operation) } = injection
+                && entry.caller(*operation).is_some()
+            {
+                let beside = format!("`{operation}` runs beside `{name}`, in the thread of who calls it");
+                return Err(format!("{beside}: it cannot be made to hang"));
+            }
+            let cell = entry.cell.clone();
+            let running = (cell.state() == RunState::Running).then(|| {
+                let scheduled = registry.activity_of(slot);
+                (scheduled.requests.clone(), scheduled.activity.clone())
+            });
+            (cell, running)
+        };
+        let Some(asked) = asked(&cell, injection)? else { return Ok(()) };
+        match running {
+            Some((requests, activity)) => {
+                let job = OperationJob { cell, asked, call, safe: true };
+                requests.try_send(job).map_err(|_| format!("too much waits for the activity `{}`", activity.name))?;
+                activity.signal.notify();
+            }
+            None => {
+                let inside = CellGuard::idle(&*cell, true, |_| true);
+                let inside = inside.map_err(|why| closed(why, name, "inject anything into").to_string())?;
+                self.operate_idle(inside, &cell, asked, call).map_err(|cause| cause.to_string())?;
+            }
+        }
+        match replied.recv_deadline(deadline) {
+            Ok(Reply::Done(_) | Reply::HalfWay) => Ok(()),
+            Ok(Reply::Failed(text) | Reply::Refused(text) | Reply::Panicked(text)) => Err(text),
+            Ok(Reply::Withdrawn) | Err(_) => Err(format!("`{name}` did not take it up: its code is busy, or hangs")),
+        }
+    }
+}
+
+/// What is to be asked of the component; none: it was enough to set a trap.
+fn asked(cell: &Cell, injection: &Injection) -> Result<Option<CellRequest>, String> {
+    Ok(Some(match injection {
+        Injection::Hang { operation: None } => CellRequest::Hang,
+        Injection::Panic => CellRequest::Panic,
+        Injection::Stall { time } => CellRequest::Stall(*time),
+        Injection::Hang { operation: Some(operation) } => {
+            let index = cell.kind.operations.binary_search(operation);
+            cell.trap(index.map_err(|_| format!("`{}` has no operation `{operation}`", cell.name))?);
+            return Ok(None);
+        }
+        Injection::Declared { name, values } => {
+            let declared = cell.kind.ty.injections.iter().enumerate().find(|(_, (known, _))| *known == name);
+            let (index, (_, declared)) =
+                declared.ok_or_else(|| format!("nothing called `{name}` can be injected into `{}`", cell.name))?;
+            let fits = |value: &Value, at: usize| declared.parameters.get(at).is_some_and(|p| value.is_of(&p.ty));
+            if values.len() != declared.parameters.len()
+                || !values.iter().enumerate().all(|(at, value)| fits(value, at))
+            {
+                return Err(format!("the parameters do not fit `{name}` of `{}`", cell.name));
+            }
+            CellRequest::Injection(index, values.clone())
+        }
+    }))
+}

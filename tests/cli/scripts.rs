@@ -1,0 +1,324 @@
+//! What scripts measure, record and expect, and what is told when they fail.
+
+use crate::demo::{Demo, Ran};
+use serde_json::Value as Json;
+
+const ROOT: &str = env!("CARGO_MANIFEST_DIR");
+
+/// Runs a script that lies beside the demo's files; `@` stands for the project's deployments.
+pub fn script(demo: &Demo, text: &str, more: &[&str]) -> Ran {
+    demo.write("script.lua", &text.replace('@', &format!("{ROOT}/deployments/")));
+    demo.run(&[&["run", "script.lua", "--clock", "simulated"], more].concat())
+}
+
+fn hello(text: &str, more: &[&str]) -> Ran {
+    script(&Demo::new(), &format!("deploy('@hello.yaml')\n{text}"), more)
+}
+
+/// What is said of a script that fails, on one line.
+fn refused(text: &str) -> String {
+    let ran = hello(text, &["--quiet"]);
+    assert_eq!(ran.code, 1, "{text}: {}{}", ran.out, ran.err);
+    ran.err.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ")
+}
+
+#[test]
+fn a_signal_is_what_the_port_carries_now() {
+    let ran = hello(
+        "local first = signal('gain.y')
+         local began = now()
+         assert(signal('gain.y') == first and now() == began, 'what is looked at already takes no time')
+         wait(0.5)
+         local u = signal('gain.u')                 -- an in-port that is driven
+         assert(math.abs(signal('gain.y') - 0.5 * u) < 1e-12 and u ~= first)
+         wait(0.5)
+         assert(signal('sine.y') == signal('gain.u') and signal('gain.u') ~= u)
+         assert(property('gain.k') == 0.5)
+         shutdown()
+         deploy('@youbot_arm.yaml')
+         local second = signal('youbot.jointstate.pos[1]')
+         local at = signal('youbot.jointstate')
+         assert(#at.pos == 5 and signal('youbot.jointstate.pos[1]') == at.pos[2] and at.pos[2] ~= second)
+         shutdown()",
+        &["--quiet"],
+    );
+    assert_eq!(ran.code, 0, "{}{}", ran.out, ran.err);
+}
+
+#[test]
+fn an_in_port_that_nothing_drives_is_what_was_written() {
+    let demo = Demo::new();
+    let ran = script(
+        &demo,
+        "deploy('deployment.yaml') wait_answer('slow.ok', 1)
+         assert(signal('sink.flag') == false and signal('sink.w') == nil)
+         signal('source.y')",
+        &["--quiet"],
+    );
+    assert_eq!(ran.code, 1);
+    assert!(ran.err.contains("this platform does not show what goes through ports"), "{}", ran.err);
+}
+
+#[test]
+fn what_leads_nowhere_is_named_at_its_line() {
+    for (text, says) in [
+        ("signal('gian.y')", "there is no component `gian`: did you mean `gain`?"),
+        ("signal('gain.yy')", "`gain` has no property or port `yy`: did you mean `y`?"),
+        ("signal('gain.k')", "`gain.k` is a property: `property(\"gain.k\")` reads it"),
+        ("signal('gain.y[0]')", "`[0]` of float, which has no elements"),
+        ("sample{ every = 0, signals = { y = 'gain.y' } }", "every 0 s: a number of seconds from"),
+        ("sample{ signals = { y = 'gain.y' } }", "`sample` needs `every`"),
+        ("sample{ every = 1, signals = {} }", "`sample` needs signals"),
+        ("sample{ every = 1, signal = {} }", "there is no option `signal`: did you mean `signals`?"),
+        ("sample{ every = 1, signals = { y = 'gain.z' } }", "`gain` has no property or port `z`"),
+        (
+            "local s = sample{ every = 1, signals = { y = 'gain.y' } } s:rms('x')",
+            "has no signal `x`: known signals: `y`",
+        ),
+        ("local s = sample{ every = 1, signals = { y = 'gain.y' } } s:rms('y')", "has no value of `y` yet"),
+        ("local s = sample{ every = 1, signals = { y = 'gain.y' } } s:rmss('y')", "has no `rmss`: did you mean `rms`?"),
+        ("sample{ every = 1, signals = { 'gain.y' }, name = 'a/b' }", "`a/b` is no name"),
+        ("expect{ name = 'e', value = 1 }", "`expect` needs `min`, `max` or both"),
+        ("expect{ name = 'e', max = 1 }", "`expect` needs `value`"),
+        ("expect{ name = 'e', value = '1', max = 1 }", "`value` is a number, and this is of the type string"),
+        ("expect{ name = 'e', value = 1, maximum = 1 }", "there is no option `maximum`: did you mean `max`?"),
+        (
+            "figure{ name = 'e', value = 1 }\nfigure{ name = 'e', value = 1 }",
+            "there is a figure `e` already (script.lua:2)",
+        ),
+    ] {
+        let said = refused(text);
+        assert!(said.contains(says) && said.contains("script.lua:"), "{text}: {said}");
+    }
+}
+
+#[test]
+fn a_recording_is_summed_up_and_kept() {
+    let demo = Demo::new();
+    let ran = script(
+        &demo,
+        "deploy('@hello.yaml')
+         local s = sample{ name = 'sine', every = 0.01, signals = { y = 'gain.y', u = 'sine.y', again = 'gain.y' } }
+         wait(4.005)
+         s:stop()
+         local n = s:count('y')
+         assert(n == 400, n)
+         assert(math.abs(s:rms('u') - math.sqrt(0.5)) < 1e-3 and math.abs(s:mean('u')) < 1e-3)
+         assert(math.abs(s:max('u') - 1) < 1e-3 and math.abs(s:min('u') + 1) < 1e-3)
+         local y, u, t = s:values('y'), s:values('u'), s:times()
+         assert(#y == n and #t == n and t[2] > t[1] and math.abs(t[2] - t[1] - 0.01) < 1e-9)
+         for i = 1, n do assert(math.abs(y[i] - 0.5 * u[i]) < 1e-12) end
+         assert(s:last('again') == y[n])
+         wait(1)
+         assert(s:count('y') == n, 'it was stopped')
+         shutdown()",
+        &["--quiet", "--samples", "kept"],
+    );
+    assert_eq!(ran.code, 0, "{}{}", ran.out, ran.err);
+    let kept = demo.read("kept/sine.csv");
+    assert_eq!(kept.lines().next(), Some("time,gain.y,sine.y"));
+    assert_eq!(kept.lines().count(), 401);
+    // It is a recording as monitors read it.
+    demo.write("m.lua", "Monitors { high = monitor { when = above('sine.y', 0.9), event = 'e_high' } }");
+    let ran = demo.run(&["monitor", "m.lua", "--samples", "kept/sine.csv", "--json"]);
+    assert_eq!(ran.code, 0, "{}{}", ran.out, ran.err);
+    assert!(ran.out.contains("e_high"), "{}", ran.out);
+}
+
+/// The lines that are JSON with that `what`.
+fn told<'a>(out: &'a str, what: &'a str) -> impl Iterator<Item = Json> + 'a {
+    let lines = out.lines().filter_map(|line| serde_json::from_str::<Json>(line).ok());
+    lines.filter(move |line| line["what"] == what)
+}
+
+#[test]
+fn a_figure_out_of_bounds_fails_the_script_at_its_end() {
+    let text = "wait(0.1)
+         expect{ name = 'kept', value = 1, min = 0, max = 1, unit = 'm' }
+         expect{ name = 'high', value = 2.5, max = 2, unit = 'N' }
+         expect{ name = 'none', value = 0/0, min = 0 }
+         figure{ name = 'seen', value = 7 }
+         raise('e_loud') wait_answer('loud.ok', 1)
+         say('went on')
+         shutdown()";
+    let ran = hello(text, &["--quiet"]);
+    assert_eq!(ran.code, 1, "{}{}", ran.out, ran.err);
+    for line in
+        ["went on", "high    2.5 N  at most 2 N", "kept    1 m    at least 0 m and at most 1 m  ok", "seen    7"]
+    {
+        assert!(ran.out.contains(line), "{line}: {}", ran.out);
+    }
+    // Where it was missed: what was in force then, and not what came of it later.
+    assert!(ran.out.contains("stack   quiet, run, build, newest first"), "{}", ran.out);
+    assert!(ran.out.contains("answer     quiet.ok") && !ran.out.contains("loud.ok"), "{}", ran.out);
+    for word in ["script::missed", "script.lua:4: high is 2.5 N, expected at most 2 N", "2 of 3 figures out of bounds"]
+    {
+        assert!(ran.err.contains(word), "{word}: {}", ran.err);
+    }
+    let ran = hello(text, &["--json"]);
+    assert_eq!(ran.code, 1);
+    let figures = told(&ran.out, "figures").next().expect("the table")["figures"].clone();
+    let ok: Vec<bool> = figures.as_array().unwrap().iter().map(|f| f["ok"].as_bool().unwrap()).collect();
+    assert_eq!(ok, [true, false, false, true]);
+    assert_eq!((&figures[1]["value"], &figures[2]["value"]), (&2.5.into(), &Json::Null));
+    let scene = told(&ran.out, "failed").next().expect("where it failed");
+    assert_eq!(scene["stack"][2]["configuration"], "quiet");
+    assert!(ran.out.lines().last().unwrap().contains("script::missed"), "{}", ran.out);
+}
+
+#[test]
+fn a_fatal_one_fails_it_at_once_and_catching_it_is_no_way_out() {
+    let ran = hello("expect{ name = 'e', value = 2, max = 1, fatal = true }\nsay('went on')", &["--quiet"]);
+    assert!(ran.code == 1 && !ran.out.contains("went on"), "{}{}", ran.out, ran.err);
+    assert!(ran.err.contains("script.lua:2: e is 2, expected at most 1"), "{}", ran.err);
+    let ran = hello("pcall(expect, { name = 'e', value = 2, max = 1, fatal = true })\nsay('went on')", &["--quiet"]);
+    assert!(ran.code == 1 && ran.out.contains("went on"), "{}{}", ran.out, ran.err);
+}
+
+#[test]
+fn what_was_there_is_told_of_whatever_fails() {
+    for text in ["assert(false, 'no luck')", "wait_state('hard', 0.1)", "assert_state('gain', 'stopped')"] {
+        let ran = hello(&format!("raise('e_quiet') wait(0.05)\n{text}"), &["--quiet"]);
+        assert_eq!(ran.code, 1);
+        for word in ["where it failed: at", "root.operational.soft", "quiet, run, build", "event      e_quiet"] {
+            assert!(ran.out.contains(word), "{text}: {word}: {}", ran.out);
+        }
+    }
+}
+
+#[test]
+fn a_fault_goes_into_a_component_at_its_time() {
+    let ran = hello(
+        "inject('gain', 'panic', nil, now() + 0.25)
+         wait(0.2)
+         assert_running('gain')
+         wait(0.1)
+         assert_state('gain', 'faulted')
+         shutdown()
+         deploy('@youbot_arm.yaml')
+         local at = now() + 0.5
+         inject('youbot', 'overcurrent', {}, at)
+         wait_answer('e_OVERCURRENT', 1)
+         assert(now() - at < 0.002, now())
+         wait_answer('safe_hold.ok', 1)",
+        &[],
+    );
+    assert_eq!(ran.code, 0, "{}{}", ran.out, ran.err);
+    assert!(ran.err.is_empty() && ran.out.contains("0.250 s  inject  gain: panic"), "{}{}", ran.out, ran.err);
+    let types = crate::demo::at_home(&["types", "youbot.Driver"]);
+    for line in ["overcurrent()", "stall(seconds: float)", "its code panics"] {
+        assert!(types.out.contains(line), "{line}: {}", types.out);
+    }
+}
+
+#[test]
+fn what_cannot_be_injected_is_named_at_its_line() {
+    for (text, says) in [
+        ("inject('gian', 'panic')", "no configuration creates a component `gian`: did you mean `gain`?"),
+        ("inject('gain', 'panik')", "nothing called `panik` can be injected into standard.Gain: did you mean `panic`?"),
+        ("inject('gain', 'stall', { secnds = 1 })", "`stall` has no parameter `secnds`: did you mean `seconds`?"),
+        ("inject('gain', 'stall', { seconds = 'x' })", "expected float"),
+        ("inject('gain', 'stall', 0.5)", "`inject` takes parameters as a table"),
+        ("wait(1) inject('gain', 'panic', nil, 0.5)", "`inject` at 0.5 s, and it is 1 s already"),
+        ("inject('gain', 'panic', nil, 9) wait(1) shutdown()", "script.lua:2: `panic` was to happen to `gain` at 9 s"),
+    ] {
+        let said = refused(text);
+        assert!(said.contains(says) && said.contains("script.lua:2"), "{text}: {said}");
+    }
+    let ran = script(&Demo::new(), "deploy('deployment.yaml') inject('source', 'panic')", &["--quiet"]);
+    assert!(ran.code == 1 && ran.err.contains("on this platform"), "{}", ran.err);
+}
+
+#[test]
+fn a_value_that_is_set_is_waited_for_and_says_why_not() {
+    let ran = hello(
+        "set('gain.k', 3.0, { force = true, within = 1 })
+         assert(property('gain.k') == 3)
+         set('gain.k', 4.0, { force = true, within = 1 })
+         assert(property('gain.k') == 4)
+         undo('gain.k') wait_answer('gain.k.undone', 1)
+         wait(0.1)
+         shutdown()
+         deploy('@youbot_arm.yaml')
+         set('Peer.delay', 0.05, { force = true, within = 1 })
+         assert(property('Peer.delay') == 0.05)
+         shutdown()",
+        &["--quiet"],
+    );
+    assert_eq!(ran.code, 0, "{}{}", ran.out, ran.err);
+    let said = refused("set('gain.k', 3.0, { within = 1 })");
+    assert!(said.contains("gain.k.failed") && said.contains("--force"), "{said}");
+}
+
+/// Same seed, same log and samples, byte for byte.
+#[test]
+fn a_scenario_is_the_same_every_time() {
+    let story = "deploy('@youbot_arm.yaml')
+        local s = sample{ every = 0.002, name = 'arm', signals = { f = 'Cart_Impedance.f_raw_norm', q = 'youbot.jointstate.pos[1]',
+          x = 'youbot.odometry.x', i = 'youbot.motor_states.current[2]' } }
+        wait_state('copying', 15)
+        wait(0.5)
+        set('Peer.delay', 0.02, { force = true, within = 1 })
+        inject('Operator', 'stall', { seconds = 0.03 }, now() + 0.1)
+        inject('youbot', 'ec_timeout', nil, now() + 0.3)
+        wait_answer('e_EC_TIMEOUT', 1)
+        wait(0.5)
+        figure{ name = 'force', value = s:max('f'), unit = 'N' }";
+    let run = || {
+        let demo = Demo::new();
+        let ran = script(&demo, story, &["--json", "--samples", "kept"]);
+        assert!(ran.err.is_empty(), "{}", ran.err);
+        (ran.code, ran.out, demo.read("kept/arm.csv"))
+    };
+    let first = run();
+    assert!(first.1.contains("e_EC_TIMEOUT") && first.2.lines().count() > 500, "{}", first.1);
+    for again in 2..=5 {
+        let (code, out, samples) = run();
+        assert_eq!(code, first.0);
+        let differs = out.lines().zip(first.1.lines()).find(|(a, b)| a != b);
+        assert!(out == first.1, "run {again}: {differs:?}");
+        let differs = samples.lines().zip(first.2.lines()).find(|(a, b)| a != b);
+        assert!(samples == first.2, "run {again}: {differs:?}");
+    }
+}
+
+/// The blocks of Lua in the guide that are marked, each with its mark and what stands behind it up to the next one.
+pub fn blocks() -> Vec<(String, String, String)> {
+    let text = std::fs::read_to_string(format!("{ROOT}/docs/scripts.md")).expect("the guide");
+    let marked = text.split("<!-- script: ").skip(1);
+    let one = |part: &str| {
+        let (mark, rest) = part.split_once(" -->\n```lua\n").expect("a block behind its mark");
+        let (block, rest) = rest.split_once("```\n").expect("an end");
+        (mark.to_owned(), block.to_owned(), rest.to_owned())
+    };
+    marked.map(one).collect()
+}
+
+/// What the guide shows is so: `runs` ends well, `fails` ends with 1; each prints what stands in the block that follows at once.
+#[test]
+fn the_blocks_of_the_guide_do_what_they_say() {
+    let demo = Demo::new();
+    let blocks = blocks();
+    assert!(blocks.len() > 4, "the guide was not understood");
+    for (mark, block, rest) in blocks {
+        demo.write("story.lua", &block.replace("../deployments", &format!("{ROOT}/deployments")));
+        let mut words = mark.split_whitespace();
+        let first = words.next();
+        let more: Vec<&str> = words.collect();
+        let command: &[&str] = if first == Some("sweep") {
+            &["sweep", "story.lua"]
+        } else {
+            &["run", "story.lua", "--clock", "simulated"]
+        };
+        let ran = demo.run(&[command, &more].concat());
+        assert_eq!(ran.code, i32::from(first != Some("runs")), "{block}: {}{}", ran.out, ran.err);
+        let Some(shown) = rest.trim_start().strip_prefix("```console\n").and_then(|rest| rest.split("```").next())
+        else {
+            continue;
+        };
+        for line in shown.lines().filter(|line| !line.starts_with("$ ") && !line.contains('…')) {
+            let line = line.trim_end();
+            assert!(ran.out.contains(line) || ran.err.contains(line), "not printed: {line}\n{}{}", ran.out, ran.err);
+        }
+    }
+}
