@@ -3,7 +3,8 @@
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-const COMPONENTS: [&str; 12] = [
+const COMPONENTS: [&str; 13] = [
+    "World",
     "youbot",
     "Arm_Kinematics",
     "Cart_Impedance",
@@ -124,7 +125,7 @@ pub fn youbots(folder: &Path, robots: &[&str]) -> PathBuf {
     };
     let deployment = format!(
         "davit: 1\nname: youbots\nplatform: embedded\nlibraries: [youbot]\nwith: {{ stand_in: true }}\n\
-         activities:\n  control: {{ period_ms: 1.0, priority: 80 }}\n  link: {{ period_ms: 1.0, priority: 70 }}\n  \
+         activities:\n  world: {{ period_ms: 0.5, priority: 90 }}\n  control: {{ period_ms: 1.0, priority: 80 }}\n  link: {{ period_ms: 1.0, priority: 70 }}\n  \
          base: {{ period_ms: 4.0, priority: 60 }}\n  safety: {{ period_ms: 5.0, priority: 75 }}\n  \
          watch: {{ period_ms: 10.0, priority: 40 }}\n\
          configurations: [{}]\ncoordinators: {{ {} }}\nmonitors: [{}]\n\

@@ -3,16 +3,21 @@
 mod bench;
 mod chatter;
 mod composed;
+mod contact;
 #[path = "../support/counting.rs"]
 #[allow(dead_code)] // only what one thread asks for
 mod counting;
+mod coupled;
 mod coupling;
 mod faults;
 mod files;
+#[path = "../support/flat.rs"]
+mod flat;
 mod golden;
 mod last_word;
 mod live;
 mod motion;
+mod passive;
 mod robot;
 mod stops;
 mod two;

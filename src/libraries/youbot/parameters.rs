@@ -98,9 +98,6 @@ pub const VISCOUS: [f64; JOINTS] = [1.5, 1.0, 1.0, 0.3, 0.1];
 /// Compensation must be softer than friction is, or it pushes a joint that stands.
 pub const FRICTION_SLOPE: f64 = 0.05;
 
-/// The same for the plant's own friction, in rad/s (assumed: close to a true Coulomb characteristic).
-pub const PLANT_FRICTION_SLOPE: f64 = 0.0001;
-
 /// Highest joint speed, in rad/s (U).
 pub const SPEED_LIMIT: f64 = 1.571;
 

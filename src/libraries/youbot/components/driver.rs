@@ -1,19 +1,15 @@
-//! `youbot.Driver`: the robot's driver, with the robot itself simulated behind it.
+//! `youbot.Driver`: the robot's driver.
 
 use super::aged;
-use super::samples::{DriverState, JointState, MotorStates, Odometry, Twist, stamp};
-use crate::libraries::youbot::drives::{DriveHappening, DriveMode, DriveParameters, Drives};
-use crate::libraries::youbot::parameters::{GEAR, GRIPPER, JOINTS, PARK_POSE_DEG, TORQUE_CONSTANT, TORQUE_LIMIT};
-use crate::libraries::youbot::plant::ArmPlant;
-use crate::libraries::youbot::rigid_body::{ArmModel, J5, radians};
+use super::samples::{DriverState, JointState, MotorStates, Odometry, PlantCommand, PlantState, Twist, stamp};
+use crate::libraries::youbot::drives::{DriveHappening, DriveMode, DriveParameters, Driven, Drives, Measured};
+use crate::libraries::youbot::parameters::{GEAR, JOINTS, PARK_POSE_DEG, TORQUE_CONSTANT, TORQUE_LIMIT};
+use crate::libraries::youbot::rigid_body::{J5, radians};
 use crate::model::{EventName, Tunable};
 use crate::runtime::{Builder, Component, Context, EventOut, In, OperationAnswer, Out, Prop, Ticket};
-use nalgebra::Vector3;
 
-/// Falling by more than this when the drives go off is dropping the arm, in m.
-const DROP: f64 = 0.02;
-/// A push older than this has ended, in s.
-const PUSH_STALE: f64 = 0.05;
+/// An arm that was not heard for so long is not there any more: the field bus has failed, in s.
+const BUS_TIMEOUT: f64 = 0.02;
 /// Drives that take torques are watched: when whoever does was not heard for so long it has stopped, in s.
 const UNWATCHED: f64 = 0.04;
 /// What lasts is told again so much later, as monitors do it: who was elsewhere when it began still hears of it. In s.
@@ -52,22 +48,20 @@ pub struct Driver {
     effort: In<J5>,
     cmd_twist: In<Twist>,
     gripper: In<i32>,
-    ext_force: In<Vector3<f64>>,
+    plant_state: In<PlantState>,
     watched: In<bool>,
     jointstate: Out<JointState>,
     odometry: Out<Odometry>,
     motor_states: Out<MotorStates>,
     driver_state: Out<DriverState>,
     control_mode: Out<u8>,
+    plant_command: Out<PlantCommand>,
     events: EventOut,
     tau_max: Prop<J5>,
-    q_start: Prop<J5>,
     cmd_timeout: Prop<f64>,
     base_timeout: Prop<f64>,
     soft_limit: Prop<f64>,
     scale_end: Prop<f64>,
-    friction_scale: Prop<f64>,
-    mass_scale: Prop<f64>,
     comm_fault: Prop<String>,
     ifname: Prop<String>,
     names: Events,
@@ -78,18 +72,22 @@ pub struct Driver {
     task: Option<Ticket>,
     /// For how long nobody has been watching, since that was told last, in s.
     unwatched: Option<f64>,
+    /// The same of the arm.
+    unheard: Option<f64>,
+    /// Where it was heard last.
+    plant: PlantState,
 }
 
 impl Component for Driver {
     fn new(b: &mut Builder<Self>) -> Self {
         b.describe(
-            "The youBot's driver, with arm and base simulated behind it (rigid-body dynamics, friction, stops, base lag). \
-             Drives start off; the arm then rests on its stops or sinks onto them.",
+            "The youBot's driver: of an arm and a base that are in youbot.World. Drives start off; the arm then rests on its \
+             stops or sinks onto them. An arm that is not heard any more for 20 ms: e_EC_TIMEOUT.",
         )
         .actuator()
+        .start_after("youbot.World")
         .on_configure(|c, _| {
-            let model = ArmModel::youbot(GRIPPER.mass, c.mass_scale.get());
-            c.drives = Drives::new(ArmPlant::new(model, c.q_start.get()));
+            c.drives = Drives::new(radians(PARK_POSE_DEG));
             c.motors = MotorStates { temp: [AMBIENT; JOINTS], ..MotorStates::default() };
             c.bus = DriverState::default();
             if c.ifname.get_ref().is_empty() {
@@ -98,15 +96,22 @@ impl Component for Driver {
             Ok(())
         })
         .on_start(|c, _| {
+            let Some(state) = c.plant_state.get() else {
+                return Err("the arm is not heard (plant_state): start the world that it is in first".into());
+            };
+            c.drives.measured = Measured { q: state.pos.into(), qd: state.vel.into() };
+            c.plant = state;
             c.running = true;
+            (c.unwatched, c.unheard) = (None, None);
             Ok(())
         })
         .on_stop(|c, _| {
             c.running = false;
             c.task = None;
-            if c.drives.switch_off() > DROP {
+            if !c.drives.switch_off() {
                 c.events.raise(c.names.dropped);
             }
+            c.plant_command.write(PlantCommand { braked: true, ..PlantCommand::default() });
             Ok(())
         });
         b.doc("Changes what the drives do: 0 off, 1 hold a position, 6 take torques.").operation(
@@ -187,7 +192,7 @@ impl Component for Driver {
             effort: b.doc("Torques, heard in mode 6.").unit("N m").input("joint_effort_command"),
             cmd_twist: b.doc("Motion of the base, in its frame, heard in mode 6.").input("cmd_twist"),
             gripper: b.doc("1 opens, 0 closes the gripper.").input("gripper_cmd"),
-            ext_force: b.doc("What pushes the tool in the simulation, in the world.").unit("N").input("ext_force"),
+            plant_state: b.doc("Where arm and base are.").required().input("plant_state"),
             watched: b
                 .doc("Whatever whoever watches the robot writes. Silent for 40 ms in mode 6: e_watch_lost.")
                 .input("watched"),
@@ -196,18 +201,13 @@ impl Component for Driver {
             motor_states: b.doc("How the motors are.").output("motor_states"),
             driver_state: b.doc("How the field bus is.").output("driver_state"),
             control_mode: b.doc("What the drives do: 0, 1 or 6.").output("control_mode"),
+            plant_command: b.doc("What is done to arm and base.").output("plant_command"),
             events: b.doc("Limits, watchdogs, errors.").event_output("events"),
             tau_max: b
                 .doc("Largest torques.")
                 .unit("N m")
                 .range(0.0..=20.0)
                 .property("tau_max", J5::from(TORQUE_LIMIT)),
-            q_start: b
-                .doc("Where the arm is when the simulation begins, rad from candle.")
-                .unit("rad")
-                .range(-3.0..=3.0)
-                .tunable(Tunable::Unconfigured)
-                .property("q_start", radians(PARK_POSE_DEG)),
             cmd_timeout: b
                 .doc("Without a torque command for so long the drives hold by themselves.")
                 .unit("s")
@@ -226,15 +226,6 @@ impl Component for Driver {
                 .doc("Share of a joint's range at which no outward torque is left.")
                 .range(0.1..=1.0)
                 .property("scale_end", p.scale_end),
-            friction_scale: b
-                .doc("The simulated friction, as a multiple of the nominal one.")
-                .range(0.0..=10.0)
-                .property("friction_scale", 1.0),
-            mass_scale: b
-                .doc("The simulated masses, as a multiple of the nominal ones.")
-                .range(0.1..=3.0)
-                .tunable(Tunable::Unconfigured)
-                .property("mass_scale", 1.0),
             comm_fault: b
                 .doc("Fault to inject: none, overcurrent, overtemp, ec_timeout, encoder, emergency.")
                 .property("comm_fault", "none".to_owned()),
@@ -256,12 +247,14 @@ impl Component for Driver {
                 unwatched: b.event("e_watch_lost"),
                 faults: FAULTS.map(|(_, event, _)| b.event(event)),
             },
-            drives: Drives::new(ArmPlant::new(ArmModel::youbot(GRIPPER.mass, 1.0), radians(PARK_POSE_DEG))),
+            drives: Drives::new(radians(PARK_POSE_DEG)),
             running: false,
             motors: MotorStates::default(),
             bus: DriverState::default(),
             task: None,
             unwatched: None,
+            unheard: None,
+            plant: PlantState::default(),
         }
     }
 
@@ -273,16 +266,15 @@ impl Component for Driver {
             soft_limit: self.soft_limit.get(),
             scale_end: self.scale_end.get(),
         };
-        self.drives.arm.friction_scale = self.friction_scale.get();
         if self.comm_fault.changed() {
             let wanted = self.comm_fault.get_ref().clone();
             self.fail(&wanted);
         }
         let effort = aged(&mut self.effort, cx);
         let twist = aged(&mut self.cmd_twist, cx).map(|(t, age)| (t.into(), age));
-        // Nobody pushes on after the hand is gone.
-        let push =
-            aged(&mut self.ext_force, cx).filter(|(_, age)| *age <= PUSH_STALE).map(|(f, _)| f).unwrap_or_default();
+        let (plant, age) = aged(&mut self.plant_state, cx).unwrap_or((self.plant, f64::INFINITY));
+        self.plant = plant;
+        self.unheard = self.again(age > BUS_TIMEOUT, self.unheard, cx.dt(), |c| _ = c.fail("ec_timeout"));
         let _ = self.gripper.take();
         if self.task.as_ref().is_some_and(Ticket::is_cancelled) {
             // Nobody waits any more: the motion ends where it is.
@@ -290,7 +282,8 @@ impl Component for Driver {
             self.drives.hold();
         }
         let (events, names, task) = (&mut self.events, &self.names, &mut self.task);
-        self.drives.update(effort, twist, &push, cx.dt(), &mut |what| match what {
+        let measured = Measured { q: plant.pos.into(), qd: plant.vel.into() };
+        let driven = self.drives.update(measured, effort, twist, cx.dt(), &mut |what| match what {
             DriveHappening::SoftLimit => events.raise(names.soft_limit),
             DriveHappening::SoftLimitExit => events.raise(names.soft_limit_exit),
             DriveHappening::CommandWatchdog => events.raise(names.command_watchdog),
@@ -315,14 +308,9 @@ impl Component for Driver {
             }
         });
         let lost = aged(&mut self.watched, cx).is_some_and(|(_, age)| age > UNWATCHED);
-        let told = self.unwatched.map(|since| since + cx.dt()).filter(|since| *since < AGAIN);
-        self.unwatched = (lost && self.drives.mode() == DriveMode::Torque).then(|| {
-            told.unwrap_or_else(|| {
-                self.events.raise(self.names.unwatched);
-                0.0
-            })
-        });
-        self.publish(cx);
+        let lost = lost && self.drives.mode() == DriveMode::Torque;
+        self.unwatched = self.again(lost, self.unwatched, cx.dt(), |c| c.events.raise(c.names.unwatched));
+        self.publish(&plant, &driven, cx);
     }
 }
 
@@ -341,6 +329,17 @@ impl Driver {
         }
     }
 
+    /// Tells what is so, and tells it again as long as it lasts; since when it was told last, in s.
+    fn again(&mut self, so: bool, told: Option<f64>, dt: f64, tell: impl FnOnce(&mut Self)) -> Option<f64> {
+        let told = told.map(|since| since + dt).filter(|since| *since < AGAIN);
+        so.then(|| {
+            told.unwrap_or_else(|| {
+                tell(self);
+                0.0
+            })
+        })
+    }
+
     /// A fault of that name happens; false: there is none.
     fn fail(&mut self, wanted: &str) -> bool {
         let Some(i) = FAULTS.iter().position(|(name, ..)| *name == wanted) else { return false };
@@ -352,15 +351,13 @@ impl Driver {
         true
     }
 
-    fn publish(&mut self, cx: &Context) {
+    fn publish(&mut self, plant: &PlantState, driven: &Driven, cx: &Context) {
+        let (torque, twist) = (driven.torque.into(), driven.twist.into());
+        self.plant_command.write(PlantCommand { torque, braked: driven.braked, twist });
         let d = &self.drives;
-        self.jointstate.write(JointState {
-            pos: d.arm.q.into(),
-            vel: d.arm.qd.into(),
-            eff: d.torque.into(),
-            stamp: stamp(cx.now()),
-        });
-        self.odometry.write(Odometry::new(d.base.pose, d.base.twist));
+        let (pos, vel) = (d.measured.q.into(), d.measured.qd.into());
+        self.jointstate.write(JointState { pos, vel, eff: torque, stamp: stamp(cx.now()) });
+        self.odometry.write(plant.base);
         for i in 0..JOINTS {
             let current = d.torque[i] / (TORQUE_CONSTANT[i] * GEAR[i]);
             let heat = AMBIENT + HEATING * current * current - self.motors.temp[i];
