@@ -21,6 +21,7 @@ mod passive;
 mod robot;
 mod stops;
 mod two;
+mod variants;
 
 #[global_allocator]
 static ALLOCATOR: counting::Counting = counting::Counting;

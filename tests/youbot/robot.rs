@@ -259,9 +259,17 @@ fn a_motion_that_is_given_up_ends_where_it_is() {
 
 #[test]
 fn faults_of_the_drives_are_told_and_the_arm_is_held() {
-    for (fault, event) in
-        [("overcurrent", "e_OVERCURRENT"), ("ec_timeout", "e_EC_TIMEOUT"), ("encoder", "e_ENCODER_ERR")]
-    {
+    for (fault, event) in [
+        ("overcurrent", "e_OVERCURRENT"),
+        ("undervoltage", "e_UNDERVOLTAGE"),
+        ("overtemp", "e_OVERTEMP"),
+        ("hall", "e_HALL_ERR"),
+        ("encoder", "e_ENCODER_ERR"),
+        ("sine_comm", "e_SINE_COMM_INIT_ERR"),
+        ("emergency", "e_EMERGENCY_STOP"),
+        ("ec_timeout", "e_EC_TIMEOUT"),
+        ("i2t", "e_I2T_EXCEEDED"),
+    ] {
         let mut bench = Bench::up("youbot_arm");
         bench.run(0.2);
         bench.rows();

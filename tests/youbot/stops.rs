@@ -4,7 +4,7 @@ use crate::live::{Live, Row};
 use davit::cli::exit::Exit;
 use davit::libraries::youbot::base::Twist2;
 use davit::libraries::youbot::rigid_body::J5;
-use davit::libraries::youbot::world::Body;
+use davit::libraries::youbot::world::RobotBody;
 use davit::session::{Command, Ended, Session, Stage};
 use nalgebra::Vector3;
 use std::collections::BTreeSet;
@@ -114,7 +114,7 @@ const AGAIN: f64 = 0.5;
 
 /// How far the tool comes down, in m, where the drives go off as that row shows the arm.
 fn falls(row: &Row) -> f64 {
-    let mut body = Body::new(J5::from(row.joints.pos), 1.0);
+    let mut body = RobotBody::new(J5::from(row.joints.pos), 1.0);
     let before = body.tool().position.z;
     for _ in 0..1000 {
         body.advance(&J5::zeros(), Twist2::default(), &Vector3::zeros(), true, 0.001);

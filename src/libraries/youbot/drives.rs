@@ -128,7 +128,7 @@ pub struct Measured {
 
 /// What the drives do in the next period.
 #[derive(Debug, Clone, Copy)]
-pub struct Driven {
+pub struct DriveOutput {
     /// In N m.
     pub torque: J5,
     /// The windings are shorted.
@@ -335,7 +335,7 @@ impl Drives {
         twist: Option<(Twist2, f64)>,
         dt: f64,
         report: &mut impl FnMut(DriveHappening),
-    ) -> Driven {
+    ) -> DriveOutput {
         self.measured = measured;
         self.advance_task(dt, report);
         let command = match twist {
@@ -373,7 +373,7 @@ impl Drives {
         self.watch_limits(report);
         // Windings are shorted when no torque is left.
         let braked = self.mode == DriveMode::MotorStop && self.torque == J5::zeros();
-        Driven { torque: self.torque, braked, twist: command }
+        DriveOutput { torque: self.torque, braked, twist: command }
     }
 
     fn advance_task(&mut self, dt: f64, report: &mut impl FnMut(DriveHappening)) {

@@ -9,6 +9,7 @@ pub mod handover;
 pub mod impedance;
 pub mod kinematics;
 pub mod link;
+pub mod motors;
 pub mod network;
 pub mod parameters;
 pub mod passivity;

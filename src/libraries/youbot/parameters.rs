@@ -75,6 +75,9 @@ pub const GEAR: [f64; JOINTS] = [156.0, 156.0, 100.0, 71.0, 71.0];
 /// Torque constants, in N m/A (Dv, L).
 pub const TORQUE_CONSTANT: [f64; JOINTS] = [0.0335, 0.0335, 0.0335, 0.051, 0.049];
 
+/// Counts of the encoders in a turn of the motor (Dv).
+pub const ENCODER_TICKS: f64 = 4000.0;
+
 /// Inertia of rotor and gearbox seen at the joint, in kg m² (D from M: `(rotor + gearbox) * gear²`).
 pub const REFLECTED_INERTIA: [f64; JOINTS] = [
     (1.35e-5 + 4.09e-7) * 156.0 * 156.0,

@@ -97,7 +97,8 @@ mod tests {
     #[test]
     fn queues_do_not_disturb_it() {
         // One in twenty gets through without waiting.
-        let waits = |i: u32, often: u32| if i.is_multiple_of(often) { 0.005 } else { 0.005 + f64::from(i * 7 % 30) * 1e-3 };
+        let waits =
+            |i: u32, often: u32| if i.is_multiple_of(often) { 0.005 } else { 0.005 + f64::from(i * 7 % 30) * 1e-3 };
         let wrong = measured(|i| waits(i, 20), |i| waits(i, 20), 1.0, 0.0);
         assert!(wrong.abs() < 1e-9, "{wrong}");
     }

@@ -205,7 +205,6 @@ mod tests {
         for case in 0..3 {
             let (fine, moved) = (after(case, 5e-6), after(case, 5e-4));
             let error = (fine - moved).amax();
-            println!("{error:.1e} rad off after a second ({case})");
             assert!(error < 2e-4 && (fine - radians(WORKING_POSE_DEG)).amax() > 0.01, "{case}: {error}");
         }
     }

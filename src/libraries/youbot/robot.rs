@@ -6,7 +6,7 @@ use super::dynamics::{BaseLimits, Coupled, Dynamics};
 use super::impedance::{Impedance, Reference};
 use super::kinematics::Tool;
 use super::rigid_body::{ArmModel, J5};
-use super::world::Body;
+use super::world::RobotBody;
 use nalgebra::Vector3;
 
 /// Control period, in s.
@@ -18,7 +18,7 @@ const BASE_DIVISION: u64 = 4;
 #[derive(Debug, Clone)]
 pub struct Robot {
     /// Arm and base, and what they touch.
-    pub body: Body,
+    pub body: RobotBody,
     /// The coupling's law.
     pub impedance: Impedance,
     /// Torques and twist.
@@ -41,7 +41,7 @@ impl Robot {
     /// A robot at rest with its joints at `q`, its controller knowing the plant exactly.
     pub fn new(q: J5) -> Self {
         let model = ArmModel::youbot(super::parameters::GRIPPER.mass, 1.0);
-        let body = Body::new(q, 1.0);
+        let body = RobotBody::new(q, 1.0);
         Self {
             tool: body.tool(),
             body,

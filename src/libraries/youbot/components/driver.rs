@@ -2,7 +2,8 @@
 
 use super::aged;
 use super::samples::{DriverState, JointState, MotorStates, Odometry, PlantCommand, PlantState, Twist, stamp};
-use crate::libraries::youbot::drives::{DriveHappening, DriveMode, DriveParameters, Driven, Drives, Measured};
+use crate::libraries::youbot::drives::{DriveHappening, DriveMode, DriveOutput, DriveParameters, Drives, Measured};
+use crate::libraries::youbot::motors::{Encoders, HeatChange, HeatLimit};
 use crate::libraries::youbot::parameters::{GEAR, JOINTS, PARK_POSE_DEG, TORQUE_CONSTANT, TORQUE_LIMIT};
 use crate::libraries::youbot::rigid_body::{J5, radians};
 use crate::model::{EventName, Tunable};
@@ -19,9 +20,16 @@ const HEATING: f64 = 1.5;
 const HEAT_TIME: f64 = 120.0;
 const AMBIENT: f64 = 25.0;
 
+/// The fault of a motor that gave too much for too long.
+const I2T: &str = "i2t";
+
 /// Faults that `comm_fault` injects: the property's value, the event, the flag.
-const FAULTS: [(&str, &str, i64); 5] = [
+const FAULTS: [(&str, &str, i64); 9] = [
     ("overcurrent", "e_OVERCURRENT", 0x01),
+    ("undervoltage", "e_UNDERVOLTAGE", 0x02),
+    ("hall", "e_HALL_ERR", 0x10),
+    ("sine_comm", "e_SINE_COMM_INIT_ERR", 0x100),
+    (I2T, "e_I2T_EXCEEDED", 0x200),
     ("overtemp", "e_OVERTEMP", 0x04),
     ("ec_timeout", "e_EC_TIMEOUT", 0x40),
     ("encoder", "e_ENCODER_ERR", 0x20),
@@ -33,6 +41,7 @@ struct Events {
     soft_limit_exit: EventName,
     command_watchdog: EventName,
     base_watchdog: EventName,
+    cooled: EventName,
     calibrated: EventName,
     calibration_failed: EventName,
     arrived: EventName,
@@ -62,10 +71,14 @@ pub struct Driver {
     base_timeout: Prop<f64>,
     soft_limit: Prop<f64>,
     scale_end: Prop<f64>,
+    encoders: Prop<bool>,
+    heat_limit: Prop<bool>,
     comm_fault: Prop<String>,
     ifname: Prop<String>,
     names: Events,
     drives: Drives,
+    counters: Encoders,
+    heat: HeatLimit,
     running: bool,
     motors: MotorStates,
     bus: DriverState,
@@ -88,6 +101,7 @@ impl Component for Driver {
         .start_after("youbot.World")
         .on_configure(|c, _| {
             c.drives = Drives::new(radians(PARK_POSE_DEG));
+            (c.counters, c.heat) = (Encoders::default(), HeatLimit::default());
             c.motors = MotorStates { temp: [AMBIENT; JOINTS], ..MotorStates::default() };
             c.bus = DriverState::default();
             if c.ifname.get_ref().is_empty() {
@@ -226,8 +240,17 @@ impl Component for Driver {
                 .doc("Share of a joint's range at which no outward torque is left.")
                 .range(0.1..=1.0)
                 .property("scale_end", p.scale_end),
+            encoders: b
+                .doc("Angles in whole counts of the encoders, speeds as differences of them; else as they truly are.")
+                .property("encoders", false),
+            heat_limit: b
+                .doc(
+                    "A motor gives tau_max for half a second and 80 % of it for ever (current squared times time); more: e_I2T_EXCEEDED. \
+                     Else tau_max for ever.",
+                )
+                .property("heat_limit", false),
             comm_fault: b
-                .doc("Fault to inject: none, overcurrent, overtemp, ec_timeout, encoder, emergency.")
+                .doc(&format!("Fault to inject: none, {}.", FAULTS.map(|(name, ..)| name).join(", ")))
                 .property("comm_fault", "none".to_owned()),
             ifname: b
                 .doc("The network interface of the field bus.")
@@ -238,6 +261,7 @@ impl Component for Driver {
                 soft_limit_exit: b.event("e_JNT_SOFT_LIMIT_EXEEDED_EXIT"),
                 command_watchdog: b.event("e_cmd_watchdog"),
                 base_watchdog: b.event("e_base_cmd_watchdog"),
+                cooled: b.event("e_I2T_EXCEEDED_EXIT"),
                 calibrated: b.event("e_calibrated"),
                 calibration_failed: b.event("e_calibration_failed"),
                 arrived: b.event("e_arrived"),
@@ -252,6 +276,8 @@ impl Component for Driver {
             motors: MotorStates::default(),
             bus: DriverState::default(),
             task: None,
+            counters: Encoders::default(),
+            heat: HeatLimit::default(),
             unwatched: None,
             unheard: None,
             plant: PlantState::default(),
@@ -259,8 +285,9 @@ impl Component for Driver {
     }
 
     fn update(&mut self, cx: &mut Context) {
+        let most = self.tau_max.get();
         self.drives.parameters = DriveParameters {
-            tau_max: self.tau_max.get(),
+            tau_max: self.heat.of(&most),
             cmd_timeout: self.cmd_timeout.get(),
             base_timeout: self.base_timeout.get(),
             soft_limit: self.soft_limit.get(),
@@ -282,7 +309,11 @@ impl Component for Driver {
             self.drives.hold();
         }
         let (events, names, task) = (&mut self.events, &self.names, &mut self.task);
-        let measured = Measured { q: plant.pos.into(), qd: plant.vel.into() };
+        let counted = self.counters.read(&plant.pos.into(), cx.dt());
+        let measured = match self.encoders.get() {
+            true => counted,
+            false => Measured { q: plant.pos.into(), qd: plant.vel.into() },
+        };
         let driven = self.drives.update(measured, effort, twist, cx.dt(), &mut |what| match what {
             DriveHappening::SoftLimit => events.raise(names.soft_limit),
             DriveHappening::SoftLimitExit => events.raise(names.soft_limit_exit),
@@ -307,6 +338,14 @@ impl Component for Driver {
                 }
             }
         });
+        if !self.heat_limit.get() {
+            self.heat = HeatLimit::default();
+        } else if let Some(change) = self.heat.update(&driven.torque, &most, cx.dt()) {
+            match change {
+                HeatChange::Exceeded => _ = self.fail(I2T),
+                HeatChange::Exit => self.events.raise(self.names.cooled),
+            }
+        }
         let lost = aged(&mut self.watched, cx).is_some_and(|(_, age)| age > UNWATCHED);
         let lost = lost && self.drives.mode() == DriveMode::Torque;
         self.unwatched = self.again(lost, self.unwatched, cx.dt(), |c| c.events.raise(c.names.unwatched));
@@ -351,7 +390,7 @@ impl Driver {
         true
     }
 
-    fn publish(&mut self, plant: &PlantState, driven: &Driven, cx: &Context) {
+    fn publish(&mut self, plant: &PlantState, driven: &DriveOutput, cx: &Context) {
         let (torque, twist) = (driven.torque.into(), driven.twist.into());
         self.plant_command.write(PlantCommand { torque, braked: driven.braked, twist });
         let d = &self.drives;

@@ -25,7 +25,7 @@ pub use operator::{ModeSwitch, Operator};
 pub use passivity::CouplingObserver;
 pub use peer::Peer;
 pub use reporter::Reporter;
-pub use world::World;
+pub use world::YoubotWorld;
 
 use crate::runtime::{Context, In, Library, PortValue};
 use samples::seconds_since;
@@ -33,7 +33,7 @@ use samples::seconds_since;
 /// The library `youbot`.
 pub fn library() -> Library {
     Library::new("youbot")
-        .with::<World>("youbot.World")
+        .with::<YoubotWorld>("youbot.World")
         .with::<Driver>("youbot.Driver")
         .with::<ArmKinematics>("youbot.Arm_Kinematics")
         .with::<CartImpedance>("youbot.Cart_Impedance")

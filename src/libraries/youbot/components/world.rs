@@ -4,7 +4,7 @@ use super::aged;
 use super::samples::{PlantCommand, PlantState, ToolPose, ToolTwist, stamp};
 use crate::libraries::youbot::parameters::PARK_POSE_DEG;
 use crate::libraries::youbot::rigid_body::{J5, radians};
-use crate::libraries::youbot::world::{Body, FAR, PLANT_STEP, Surroundings};
+use crate::libraries::youbot::world::{FAR, PLANT_STEP, RobotBody, Surroundings};
 use crate::model::{EventName, Tunable};
 use crate::runtime::{Builder, Component, Context, EventOut, In, Out, Prop};
 use nalgebra::Vector3;
@@ -18,7 +18,7 @@ const PUSH_STALE: f64 = 0.05;
 const FALL: f64 = 0.02;
 
 /// One robot's body with its ports.
-struct Place {
+struct WorldRobot {
     command: In<PlantCommand>,
     ext_force: In<Vector3<f64>>,
     state: Out<PlantState>,
@@ -28,16 +28,17 @@ struct Place {
     q_start: Prop<J5>,
     mass_scale: Prop<f64>,
     friction_scale: Prop<f64>,
+    torque_lag: Prop<f64>,
     table: Prop<f64>,
     wall: Prop<f64>,
-    body: Body,
+    body: RobotBody,
     /// Where its tool was when its windings were shorted, in m; none: they are not, or it has fallen and that was told.
     held_at: Option<f64>,
     braked: bool,
 }
 
-impl Place {
-    fn declare(b: &mut Builder<World>, robot: &str) -> Self {
+impl WorldRobot {
+    fn declare(b: &mut Builder<YoubotWorld>, robot: &str) -> Self {
         let named = |name: &str| format!("{robot}_{name}");
         let s = Surroundings::default();
         Self {
@@ -64,6 +65,11 @@ impl Place {
                 .doc("Its friction, as a multiple of the nominal one.")
                 .range(0.0..=10.0)
                 .property(&named("friction_scale"), 1.0),
+            torque_lag: b
+                .doc("Time constant with which its motors' torques follow what is wanted.")
+                .unit("s")
+                .range(0.0..=0.02)
+                .property(&named("torque_lag"), 0.0),
             table: b
                 .doc("Height of the table its tool may touch; far below: none.")
                 .unit("m")
@@ -74,7 +80,7 @@ impl Place {
                 .unit("m")
                 .range(-FAR..=FAR)
                 .property(&named("wall"), s.wall),
-            body: Body::new(radians(PARK_POSE_DEG), 1.0),
+            body: RobotBody::new(radians(PARK_POSE_DEG), 1.0),
             held_at: None,
             braked: false,
         }
@@ -87,6 +93,7 @@ impl Place {
         let push = aged(&mut self.ext_force, cx).filter(|(_, age)| *age <= PUSH_STALE);
         let push = push.map(|(force, _)| force).unwrap_or_default();
         self.body.arm.friction_scale = self.friction_scale.get();
+        self.body.torque_lag = self.torque_lag.get();
         self.body.surroundings = Surroundings { table: self.table.get(), wall: self.wall.get(), ..surroundings };
         self.body.advance(&command.torque.into(), command.twist.into(), &push, command.braked, cx.dt());
         let height = self.body.tool().position.z;
@@ -106,15 +113,15 @@ impl Place {
 }
 
 /// The component.
-pub struct World {
-    places: [Place; 2],
+pub struct YoubotWorld {
+    places: [WorldRobot; 2],
     events: EventOut,
     fell: EventName,
     stiffness: Prop<f64>,
     damping: Prop<f64>,
 }
 
-impl Component for World {
+impl Component for YoubotWorld {
     fn new(b: &mut Builder<Self>) -> Self {
         b.describe(&format!(
             "The simulated world: arms and bases of one or two robots (rigid bodies, friction, stops, the base's lag), and a table and a \
@@ -124,7 +131,7 @@ impl Component for World {
         ))
         .on_configure(|c, _| {
             for place in &mut c.places {
-                place.body = Body::new(place.q_start.get(), place.mass_scale.get());
+                place.body = RobotBody::new(place.q_start.get(), place.mass_scale.get());
                 (place.held_at, place.braked) = (None, false);
             }
             Ok(())
@@ -136,7 +143,7 @@ impl Component for World {
         });
         let s = Surroundings::default();
         Self {
-            places: ["robot1", "robot2"].map(|robot| Place::declare(b, robot)),
+            places: ["robot1", "robot2"].map(|robot| WorldRobot::declare(b, robot)),
             events: b
                 .doc("e_arm_fell: an arm whose windings are shorted came down by more than 2 cm.")
                 .event_output("events"),

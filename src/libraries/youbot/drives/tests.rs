@@ -1,13 +1,13 @@
 //! What the drives do, without a component around them.
 
-use super::super::world::Body;
+use super::super::world::RobotBody;
 use super::*;
 use nalgebra::Vector3;
 
 /// Drives with what they drive.
 struct Driving {
     drives: Drives,
-    body: Body,
+    body: RobotBody,
 }
 
 impl std::ops::Deref for Driving {
@@ -25,7 +25,7 @@ impl std::ops::DerefMut for Driving {
 
 impl Driving {
     fn new(degrees: [f64; JOINTS], mass: f64) -> Self {
-        Self { drives: Drives::new(radians(degrees)), body: Body::new(radians(degrees), mass) }
+        Self { drives: Drives::new(radians(degrees)), body: RobotBody::new(radians(degrees), mass) }
     }
 
     /// One update, a `push` on the tool meanwhile.
