@@ -21,7 +21,7 @@ fn up<T>(file: &str, with: impl FnOnce(&Up) -> T) -> T {
     let clock = Clock::simulated();
     let _participant = clock.enter();
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("deployments").join(file);
-    let read = app::read(&path, &LoadOptions::default(), libraries::all())
+    let read = app::read(&path, &LoadOptions::default(), libraries::builtin())
         .unwrap_or_else(|refused| panic!("{:?}", refused.findings));
     let checked = app::check(read).unwrap_or_else(|refused| panic!("{:?}", refused.findings));
     let session = app::start(&checked, &clock).unwrap();

@@ -3,6 +3,8 @@
 use crate::coupling::{Side, at_delay, hear, mm};
 use davit::libraries::youbot::hand::{Hand, HandScript};
 use davit::libraries::youbot::impedance::CouplingLaw;
+use davit::libraries::youbot::network::Quality;
+use davit::libraries::youbot::passivity::{CouplingEnd, PassivityObserver};
 use davit::libraries::youbot::robot::CONTROL_PERIOD;
 use nalgebra::Vector3;
 
@@ -82,6 +84,40 @@ fn meet(law: CouplingLaw, delay: f64, table: bool) -> Contact {
     out.pressed /= samples;
     out.after = (pair[0].robot.tool.position - pair[1].robot.tool.position).norm();
     out
+}
+
+/// What the world, the network and the laws do every millisecond.
+#[test]
+fn a_step_of_it_all_allocates_nothing() {
+    let bad = Quality {
+        delay: 0.05,
+        jitter: 0.05,
+        reorder: 0.2,
+        duplicate: 0.5,
+        loss: 0.1,
+        rate: 400.0,
+        ..Quality::default()
+    };
+    let mut pair = [Side::new(bad, 1), Side::new(bad, 2)];
+    for side in &mut pair {
+        side.robot.impedance.parameters.law = CouplingLaw::Tank;
+        side.robot.body.surroundings.table = side.robot.tool.position.z + 0.001;
+        side.robot.body.torque_lag = 0.001;
+    }
+    let mut observer = PassivityObserver::default();
+    let made = crate::counting::made_by(|| {
+        for tick in 0..2_000_u32 {
+            let now = f64::from(tick) * CONTROL_PERIOD;
+            hear(&mut pair, now);
+            for side in &mut pair {
+                side.step(now, &Vector3::new(3.0, 0.0, -3.0));
+                side.send(now);
+            }
+            let end = |side: &Side| CouplingEnd { force: side.robot.force, position: side.robot.tool.position };
+            observer.update([end(&pair[0]), end(&pair[1])]);
+        }
+    });
+    assert!(made == 0 && pair[0].robot.body.contact.norm() > 0.0, "{made}");
 }
 
 /// The table of docs/youbot.md: `cargo test --test youbot -- --nocapture --exact contact::table`.

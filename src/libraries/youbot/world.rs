@@ -136,7 +136,7 @@ mod tests {
 
     #[test]
     fn torques_follow_with_a_lag() {
-        let mut body = Body::new(radians(WORKING_POSE_DEG), 1.0);
+        let mut body = RobotBody::new(radians(WORKING_POSE_DEG), 1.0);
         body.torque_lag = 0.002;
         body.advance(&J5::repeat(1.0), Twist2::default(), &Vector3::zeros(), false, 0.002);
         assert!((body.given[0] - (1.0 - (-1.0_f64).exp())).abs() < 1e-12, "{}", body.given);
