@@ -18,6 +18,7 @@ ConfiguratorConf {
   -- Bring-up ---------------------------------------------------------------------------------------------------------
 
   create_core = Configuration { description = "the control loop",
+    create("World",          "youbot.World",          { activity = "world" }),      -- arm, base and what they touch
     create("youbot",         "youbot.Driver",         { activity = "control" }),
     create("Arm_Kinematics", "youbot.Arm_Kinematics", { activity = "control" }),
     create("Cart_Impedance", "youbot.Cart_Impedance", { activity = "control" }),
@@ -40,6 +41,9 @@ ConfiguratorConf {
   },
 
   connect_all = Configuration(with_stand_in({
+    -- the driver and what it drives
+    connect("World.robot1_state",            "youbot.plant_state"),
+    connect("youbot.plant_command",          "World.robot1_command"),
     -- control loop
     connect("youbot.jointstate",             "Arm_Kinematics.jointstate"),
     connect("youbot.odometry",               "Arm_Kinematics.odometry"),
@@ -60,12 +64,16 @@ ConfiguratorConf {
     connect("Arm_Kinematics.tool_twist",     "Link_Tx.tool_twist"),
     connect("Cart_Impedance.active",         "Link_Tx.copying"),
     connect("Monitors.is_near",              "Link_Tx.aligned"),
+    connect("Cart_Impedance.energy_sent",     "Link_Tx.energy"),
+    connect("Dynamics.yields",                "Link_Tx.yields"),
+    connect("Link_Rx.echo",                   "Link_Tx.echo"),
+    connect("Link_Rx.peer_state",             "Dynamics.peer_state"),
     -- the operator's hand
-    connect("Arm_Kinematics.tool_pose",      "Operator.tool_pose"),
-    connect("Arm_Kinematics.tool_twist",     "Operator.tool_twist"),
+    connect("World.robot1_tool_pose",        "Operator.tool_pose"),
+    connect("World.robot1_tool_twist",       "Operator.tool_twist"),
     connect("Link_Rx.ext_ref",               "Operator.ext_ref"),
     connect("youbot.control_mode",           "Operator.control_mode"),
-    connect("Operator.ext_force",            "youbot.ext_force"),
+    connect("Operator.ext_force",            "World.robot1_ext_force"),
     -- who watches is watched
     connect("Monitors.is_near",              "youbot.watched"),
     -- record
@@ -82,7 +90,7 @@ ConfiguratorConf {
   } end)),
 
   load_properties = Configuration(with_stand_in({ description = "this robot's own numbers, then everything configured",
-    property_set("youbot.q_start",               { 0.0, -1.1257, 2.5395, -1.7802, 0.0 }),
+    property_set("World.robot1_q_start",         { 0.0, -1.1257, 2.5395, -1.7802, 0.0 }),
     property_set("Cart_Impedance.stiffness",     150.0),
     property_set("Cart_Impedance.damping_abs",   5.0),
     property_set("Cart_Impedance.offset",        { 0.0, 0.0, 0.0 }),
@@ -94,7 +102,7 @@ ConfiguratorConf {
   } end)),
 
   start_driver = Configuration { description = "drives on, brakes closed: the arm rests on its stops",
-    post_conf_state = { "youbot:running" },
+    post_conf_state = { "World:running", "youbot:running" },
   },
 
   calibrate = Configuration { timeout = 10.0,
@@ -173,7 +181,7 @@ ConfiguratorConf {
   },
 
   stop_control = Configuration { description = "everything but the driver",
-    pre_conf_state = { "youbot:running", "_default:stopped" },
+    pre_conf_state = { "youbot:running", "World:running", "_default:stopped" },
   },
 
   stop_all = Configuration {
@@ -186,6 +194,8 @@ ConfiguratorConf {
   },
 
   disconnect_all = Configuration(with_stand_in({
+    disconnect("World.robot1_state",            "youbot.plant_state"),
+    disconnect("youbot.plant_command",          "World.robot1_command"),
     disconnect("youbot.jointstate",             "Arm_Kinematics.jointstate"),
     disconnect("youbot.odometry",               "Arm_Kinematics.odometry"),
     disconnect("Arm_Kinematics.tool_pose",      "Cart_Impedance.tool_pose"),
@@ -204,11 +214,15 @@ ConfiguratorConf {
     disconnect("Arm_Kinematics.tool_twist",     "Link_Tx.tool_twist"),
     disconnect("Cart_Impedance.active",         "Link_Tx.copying"),
     disconnect("Monitors.is_near",              "Link_Tx.aligned"),
-    disconnect("Arm_Kinematics.tool_pose",      "Operator.tool_pose"),
-    disconnect("Arm_Kinematics.tool_twist",     "Operator.tool_twist"),
+    disconnect("Cart_Impedance.energy_sent",     "Link_Tx.energy"),
+    disconnect("Dynamics.yields",                "Link_Tx.yields"),
+    disconnect("Link_Rx.echo",                   "Link_Tx.echo"),
+    disconnect("Link_Rx.peer_state",             "Dynamics.peer_state"),
+    disconnect("World.robot1_tool_pose",        "Operator.tool_pose"),
+    disconnect("World.robot1_tool_twist",       "Operator.tool_twist"),
     disconnect("Link_Rx.ext_ref",               "Operator.ext_ref"),
     disconnect("youbot.control_mode",           "Operator.control_mode"),
-    disconnect("Operator.ext_force",            "youbot.ext_force"),
+    disconnect("Operator.ext_force",            "World.robot1_ext_force"),
     disconnect("Monitors.is_near",              "youbot.watched"),
     disconnect("Arm_Kinematics.tool_pose",      "Reporter.tool_pose"),
     disconnect("Link_Rx.ext_ref",               "Reporter.ext_ref"),
@@ -223,7 +237,7 @@ ConfiguratorConf {
   } end)),
 
   destroy_all = Configuration(with_stand_in({
-    destroy("youbot"), destroy("Arm_Kinematics"), destroy("Cart_Impedance"), destroy("Dynamics"), destroy("Base_Ctrl"),
+    destroy("World"), destroy("youbot"), destroy("Arm_Kinematics"), destroy("Cart_Impedance"), destroy("Dynamics"), destroy("Base_Ctrl"),
     destroy("Link_Tx"), destroy("Link_Rx"),
     destroy("Monitors"), destroy("Operator"), destroy("Mode_Switch"), destroy("Reporter"),
   }, function() return {

@@ -4,8 +4,8 @@
 use super::children::{tell, told};
 use super::product::Product;
 use super::state::ProductState;
-use crate::model::subsystem::{SeenStanding, standing};
 use crate::model::SubsystemStanding;
+use crate::model::subsystem::{SeenStanding, standing};
 use crate::statechart::EventId;
 
 impl Product<'_> {

@@ -3,7 +3,8 @@
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-const COMPONENTS: [&str; 12] = [
+const COMPONENTS: [&str; 13] = [
+    "World",
     "youbot",
     "Arm_Kinematics",
     "Cart_Impedance",
@@ -19,7 +20,7 @@ const COMPONENTS: [&str; 12] = [
 ];
 
 /// What all robots hear: what begins and ends the deployment, and what components raise, which have the same types everywhere.
-const COMMON: [&str; 14] = [
+const COMMON: [&str; 18] = [
     "e_start",
     "e_shutdown",
     "e_done",
@@ -29,6 +30,10 @@ const COMMON: [&str; 14] = [
     "e_OVERTEMP",
     "e_EC_TIMEOUT",
     "e_ENCODER_ERR",
+    "e_UNDERVOLTAGE",
+    "e_HALL_ERR",
+    "e_SINE_COMM_INIT_ERR",
+    "e_I2T_EXCEEDED",
     "e_cmd_watchdog",
     "e_base_cmd_watchdog",
     "e_5dof",
@@ -124,13 +129,14 @@ pub fn youbots(folder: &Path, robots: &[&str]) -> PathBuf {
     };
     let deployment = format!(
         "davit: 1\nname: youbots\nplatform: embedded\nlibraries: [youbot]\nwith: {{ stand_in: true }}\n\
-         activities:\n  control: {{ period_ms: 1.0, priority: 80 }}\n  link: {{ period_ms: 1.0, priority: 70 }}\n  \
+         activities:\n  world: {{ period_ms: 0.5, priority: 90 }}\n  control: {{ period_ms: 1.0, priority: 80 }}\n  link: {{ period_ms: 1.0, priority: 70 }}\n  \
          base: {{ period_ms: 4.0, priority: 60 }}\n  safety: {{ period_ms: 5.0, priority: 75 }}\n  \
          watch: {{ period_ms: 10.0, priority: 40 }}\n\
          configurations: [{}]\ncoordinators: {{ {} }}\nmonitors: [{}]\n\
          deploy: {{ event: e_start, up: [{}], failed: [{}], within_s: 20 }}\n\
          shutdown: {{ event: e_shutdown, down: [{}], within_s: 20, rest: [{}] }}\nlimits: {{ stack: 64, step_timeout_s: 1.0 }}\n\
-         safety: [e_estop, e_EMERGENCY_STOP, e_OVERCURRENT, e_OVERTEMP, e_EC_TIMEOUT, e_ENCODER_ERR]\n",
+         safety: [e_estop, e_EMERGENCY_STOP, e_OVERCURRENT, e_OVERTEMP, e_EC_TIMEOUT, e_ENCODER_ERR, \
+         e_UNDERVOLTAGE, e_HALL_ERR, e_SINE_COMM_INIT_ERR, e_I2T_EXCEEDED]\n",
         each("ROBOTcoupling.lua, ROBOTconfigurations.lua"),
         each("ROBOT: ROBOTcoordinator.lua"),
         each("ROBOTmonitors.lua"),

@@ -1,56 +1,85 @@
 //! The coupling of two robots, law against law over a delayed link: the figures the design rests on.
 
 use davit::libraries::youbot::hand::{Hand, HandScript};
-use davit::libraries::youbot::impedance::Reference;
+use davit::libraries::youbot::impedance::{CouplingLaw, Reference};
 use davit::libraries::youbot::network::{Network, Quality};
 use davit::libraries::youbot::parameters::WORKING_POSE_DEG;
 use davit::libraries::youbot::rigid_body::radians;
 use davit::libraries::youbot::robot::{CONTROL_PERIOD, Robot};
 use nalgebra::Vector3;
 
-/// Position, velocity and the moment they were true, in s.
-type Sample = (Vector3<f64>, Vector3<f64>, f64);
-
-struct Side {
-    robot: Robot,
-    outgoing: Network<Sample>,
-    heard: Option<Sample>,
+pub struct Side {
+    pub robot: Robot,
+    outgoing: Network<Reference>,
+    heard: Option<Reference>,
 }
 
 impl Side {
-    fn new(quality: Quality, seed: u64) -> Self {
+    pub fn new(quality: Quality, seed: u64) -> Self {
         Self { robot: Robot::new(radians(WORKING_POSE_DEG)), outgoing: Network::new(quality, seed), heard: None }
     }
+
+    /// What has arrived by `now` (s), the newest of it; here with its age from the beginning.
+    pub fn hear(&mut self, other: &mut Self, now: f64) {
+        while let Some(reference) = other.outgoing.receive(now) {
+            if self.heard.is_none_or(|heard| heard.age > reference.age) {
+                self.heard = Some(reference);
+            }
+        }
+    }
+
+    /// One control period from `now` (s) on, both bases yielding or none.
+    pub fn step(&mut self, now: f64, push: &Vector3<f64>) {
+        // What travels has minus the moment it was sent for an age.
+        let reference = self.heard.map(|heard| Reference { age: now + heard.age, ..heard });
+        self.robot.step(reference.as_ref(), true, true, push);
+    }
+
+    pub fn send(&mut self, now: f64) {
+        let tool = &self.robot.tool;
+        let energy = self.robot.impedance.energy_sent();
+        let (position, velocity) = (tool.position, tool.velocity);
+        self.outgoing.send(now, Reference { position, velocity, age: -now, coupled: true, energy });
+    }
+}
+
+/// Both hear what has arrived.
+pub fn hear(sides: &mut [Side; 2], now: f64) {
+    let [left, right] = sides;
+    left.hear(right, now);
+    right.hear(left, now);
 }
 
 /// What was measured.
 #[derive(Debug, Default)]
-struct Figures {
-    rms: f64,
-    worst: f64,
-    raw_max: f64,
-    hand_rms: f64,
-    hand_max: f64,
-    saturated: f64,
+pub struct Figures {
+    pub rms: f64,
+    pub worst: f64,
+    pub raw_max: f64,
+    pub hand_rms: f64,
+    pub hand_max: f64,
+    pub saturated: f64,
 }
 
-struct Scenario {
-    stiffness: f64,
-    damping_rel: f64,
-    damping_abs: f64,
-    quality: Quality,
-    friction_comp: f64,
-    force_gain: f64,
-    recenter: f64,
-    script: &'static str,
-    seconds: f64,
+pub struct Scenario {
+    pub law: CouplingLaw,
+    pub stiffness: f64,
+    pub damping_rel: f64,
+    pub damping_abs: f64,
+    pub quality: Quality,
+    pub friction_comp: f64,
+    pub force_gain: f64,
+    pub recenter: f64,
+    pub script: &'static str,
+    pub seconds: f64,
     /// Control periods between two packets.
-    send_every: u64,
+    pub send_every: u64,
 }
 
 impl Default for Scenario {
     fn default() -> Self {
         Self {
+            law: CouplingLaw::Position,
             stiffness: 150.0,
             damping_rel: 12.0,
             damping_abs: 5.0,
@@ -67,10 +96,11 @@ impl Default for Scenario {
 
 impl Scenario {
     /// Robot A is moved by a hand, robot B follows.
-    fn run(&self) -> Figures {
+    pub fn run(&self) -> Figures {
         let mut sides = [Side::new(self.quality, 1), Side::new(self.quality, 2)];
         for side in &mut sides {
             let p = &mut side.robot.impedance.parameters;
+            p.law = self.law;
             p.stiffness = self.stiffness;
             p.damping_rel = self.damping_rel;
             p.damping_abs = self.damping_abs;
@@ -86,23 +116,13 @@ impl Scenario {
         let (mut saturated, mut hand_squares, mut squares) = (0u64, 0.0, 0.0);
         for tick in 0..ticks {
             let now = tick as f64 * CONTROL_PERIOD;
-            for me in 0..2 {
-                let other = 1 - me;
-                while let Some(sample) = sides[other].outgoing.receive(now) {
-                    if sides[me].heard.is_none_or(|h| h.2 < sample.2) {
-                        sides[me].heard = Some(sample);
-                    }
-                }
-            }
+            hear(&mut sides, now);
             let tool = &sides[0].robot.tool;
             let push = hand.update(&tool.position, &tool.velocity, None, CONTROL_PERIOD);
             for (side, push) in sides.iter_mut().zip([push, Vector3::zeros()]) {
-                let reference =
-                    side.heard.map(|(position, velocity, at)| Reference { position, velocity, age: now - at });
-                side.robot.step(reference.as_ref(), true, &push);
+                side.step(now, &push);
                 if tick % self.send_every == 0 {
-                    let sample = (side.robot.tool.position, side.robot.tool.velocity, now);
-                    side.outgoing.send(now, sample);
+                    side.send(now);
                 }
                 out.raw_max = out.raw_max.max(side.robot.raw_norm);
                 saturated += u64::from(side.robot.saturated != 0);
@@ -121,7 +141,7 @@ impl Scenario {
     }
 }
 
-fn mm(metres: f64) -> f64 {
+pub fn mm(metres: f64) -> f64 {
     metres * 1e3
 }
 
@@ -130,7 +150,7 @@ fn about(what: &str, measured: f64, figure: f64) {
     assert!((measured - figure).abs() <= 0.3 * figure, "{what}: {measured:.1}, the figure is {figure}");
 }
 
-fn at_delay(delay: f64) -> Quality {
+pub fn at_delay(delay: f64) -> Quality {
     Quality { delay, ..Quality::default() }
 }
 
@@ -183,7 +203,7 @@ fn delay_costs_little_up_to_a_fifth_of_a_second() {
 #[test]
 fn rate_and_loss_hardly_matter() {
     let with = |loss, jitter, send_every| {
-        let quality = Quality { delay: 0.005, loss, jitter, cut: false };
+        let quality = Quality { delay: 0.005, loss, jitter, ..Quality::default() };
         let scenario = Scenario { stiffness: 300.0, damping_rel: 20.0, send_every, quality, ..Scenario::default() };
         mm(scenario.run().rms)
     };
@@ -232,26 +252,19 @@ fn damping_by_the_rule_keeps_a_delayed_coupling_stable() {
                 (p.stiffness, p.damping_rel, p.damping_abs) = (stiffness, 0.0, damping_abs);
                 (p.f_max, p.f_rate, p.ref_max_age) = (1e3, 1e6, 10.0);
                 // Nothing but the coupling damps: the hardest case.
-                side.robot.arm.friction_scale = 0.0;
+                side.robot.body.arm.friction_scale = 0.0;
                 side.robot.dynamics.parameters.friction_comp = 0.0;
             }
             let start = pair[1].robot.tool.position;
-            pair[1].heard = None;
             let mut hand = Hand::new("push 0.5 0 3 0; free 60".parse::<HandScript>().unwrap());
             let mut late: f64 = 0.0;
             for tick in 0..10_000u32 {
                 let now = f64::from(tick) * CONTROL_PERIOD;
-                for me in 0..2 {
-                    while let Some(sample) = pair[1 - me].outgoing.receive(now) {
-                        pair[me].heard = Some(sample);
-                    }
-                }
+                hear(&mut pair, now);
                 let push = hand.update(&start, &Vector3::zeros(), None, CONTROL_PERIOD);
                 for (side, push) in pair.iter_mut().zip([push, Vector3::zeros()]) {
-                    let reference =
-                        side.heard.map(|(position, velocity, at)| Reference { position, velocity, age: now - at });
-                    side.robot.step(reference.as_ref(), true, &push);
-                    side.outgoing.send(now, (side.robot.tool.position, side.robot.tool.velocity, now));
+                    side.step(now, &push);
+                    side.send(now);
                 }
                 if now > 8.0 {
                     late = late.max((pair[0].robot.tool.position - pair[1].robot.tool.position).norm());

@@ -114,10 +114,10 @@ fn probed(id: i64, change: impl Fn(String) -> String) -> String {
     let created =
         format!("\ncreate(\"Probe\", \"test.Probe\", {{ activity = \"control\", properties = {{ id = {id} }} }}),");
     let text = behind(&text, "create_core = Configuration { description = \"the control loop\",", &created);
-    let text = behind(&text, "\n  connect_all = Configuration {", &each("connect"));
-    let text = behind(&text, "disconnect_all = Configuration {", &each("disconnect"));
-    let text = behind(&text, "destroy_all = Configuration {", "destroy(\"Probe\"),");
-    change(behind(&text, "post_conf_state = { \"youbot:running\"", ", \"Probe:running\""))
+    let text = behind(&text, "\n  connect_all = Configuration(with_stand_in({", &each("connect"));
+    let text = behind(&text, "disconnect_all = Configuration(with_stand_in({", &each("disconnect"));
+    let text = behind(&text, "destroy_all = Configuration(with_stand_in({", "destroy(\"Probe\"),");
+    change(behind(&text, "post_conf_state = { \"World:running\", \"youbot:running\"", ", \"Probe:running\""))
 }
 
 /// A file with the probe in it, read and checked once for all that want the same, one after the other: to check it takes
@@ -219,7 +219,7 @@ impl Live {
     /// The same, with other friction and other masses in its joints, as multiples of the nominal ones.
     pub fn with_joints(name: &str, script: &str, friction: f64, mass: f64) -> Self {
         let joints = format!(
-            "\nproperty_set(\"youbot.friction_scale\", {friction:?}), property_set(\"youbot.mass_scale\", {mass:?}),"
+            "\nproperty_set(\"World.robot1_friction_scale\", {friction:?}), property_set(\"World.robot1_mass_scale\", {mass:?}),"
         );
         Self::with(name, |text| {
             assert_eq!(text.matches(SHIPPED_HAND).count(), 1);
@@ -330,6 +330,7 @@ impl Live {
         let ended = self.session.take_down(false);
         assert!(ended.is_clean() && ended.forced.is_empty(), "{ended:?}\n{}", self.story(0.0));
         assert_eq!(self.first("e_arm_dropped", 0.0), None);
+        assert_eq!(self.first("e_arm_fell", 0.0), None);
         self.clock.shutdown();
     }
 }

@@ -193,6 +193,28 @@ fn stopping_an_arm_that_is_not_parked_drops_it() {
     let mut bench = Bench::up("youbot_arm");
     bench.state("youbot", Transition::Stop);
     assert!(bench.heard("e_arm_dropped"));
+    // The world goes on without the driver, and shows it.
+    assert!(!bench.heard("e_arm_fell"));
+    let told = bench.now();
+    let fell = bench.wait("e_arm_fell", 1.0) - told;
+    assert!(fell > 0.05, "in no time: {fell} s");
+}
+
+/// A world that is not heard any more is a field bus that has failed.
+#[test]
+fn without_its_world_the_driver_tells_that_the_bus_has_failed() {
+    let mut bench = Bench::up("youbot_arm");
+    let t = bench.now();
+    let silent = davit::model::MemberRef {
+        component: davit::model::ComponentName::new("World").unwrap(),
+        member: davit::model::Ident::new("robot1_state").unwrap(),
+    };
+    let heard = davit::model::MemberRef {
+        component: davit::model::ComponentName::new("youbot").unwrap(),
+        member: davit::model::Ident::new("plant_state").unwrap(),
+    };
+    bench.step(&davit::model::Step::Disconnect { from: silent, to: heard }, Duration::from_secs(1));
+    assert!(bench.wait("e_EC_TIMEOUT", 0.1) - t <= 0.022);
 }
 
 #[test]
@@ -237,9 +259,17 @@ fn a_motion_that_is_given_up_ends_where_it_is() {
 
 #[test]
 fn faults_of_the_drives_are_told_and_the_arm_is_held() {
-    for (fault, event) in
-        [("overcurrent", "e_OVERCURRENT"), ("ec_timeout", "e_EC_TIMEOUT"), ("encoder", "e_ENCODER_ERR")]
-    {
+    for (fault, event) in [
+        ("overcurrent", "e_OVERCURRENT"),
+        ("undervoltage", "e_UNDERVOLTAGE"),
+        ("overtemp", "e_OVERTEMP"),
+        ("hall", "e_HALL_ERR"),
+        ("encoder", "e_ENCODER_ERR"),
+        ("sine_comm", "e_SINE_COMM_INIT_ERR"),
+        ("emergency", "e_EMERGENCY_STOP"),
+        ("ec_timeout", "e_EC_TIMEOUT"),
+        ("i2t", "e_I2T_EXCEEDED"),
+    ] {
         let mut bench = Bench::up("youbot_arm");
         bench.run(0.2);
         bench.rows();

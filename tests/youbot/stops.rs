@@ -2,11 +2,11 @@
 
 use crate::live::{Live, Row};
 use davit::cli::exit::Exit;
-use davit::libraries::youbot::drives::Drives;
-use davit::libraries::youbot::parameters::GRIPPER;
-use davit::libraries::youbot::plant::ArmPlant;
-use davit::libraries::youbot::rigid_body::{ArmModel, J5};
+use davit::libraries::youbot::base::Twist2;
+use davit::libraries::youbot::rigid_body::J5;
+use davit::libraries::youbot::world::RobotBody;
 use davit::session::{Command, Ended, Session, Stage};
+use nalgebra::Vector3;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -114,8 +114,12 @@ const AGAIN: f64 = 0.5;
 
 /// How far the tool comes down, in m, where the drives go off as that row shows the arm.
 fn falls(row: &Row) -> f64 {
-    let model = ArmModel::youbot(GRIPPER.mass, 1.0);
-    Drives::new(ArmPlant::new(model, J5::from(row.joints.pos))).switch_off()
+    let mut body = RobotBody::new(J5::from(row.joints.pos), 1.0);
+    let before = body.tool().position.z;
+    for _ in 0..1000 {
+        body.advance(&J5::zeros(), Twist2::default(), &Vector3::zeros(), true, 0.001);
+    }
+    before - body.tool().position.z
 }
 
 fn line(came: &Came) -> String {

@@ -139,6 +139,7 @@ platform: embedded
 libraries: [youbot]
 with: { stand_in: true }
 activities:
+  world:   { period_ms: 0.5, priority: 90 }
   control: { period_ms: 1.0, priority: 80 }
   link:    { period_ms: 1.0, priority: 70 }
   base:    { period_ms: 4.0, priority: 60 }

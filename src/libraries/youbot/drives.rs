@@ -2,11 +2,11 @@
 
 use super::base::Twist2;
 use super::handover::{Handover, ramped, slowed, within_speed};
-use super::parameters::{JOINTS, PARK_POSE_DEG, RANGE_LOWER_DEG, RANGE_UPPER_DEG, TORQUE_LIMIT, WORKING_POSE_DEG};
-use super::plant::{ArmPlant, BasePlant, joint_ranges};
-use super::rigid_body::{J5, radians};
-use super::robot::advance;
-use nalgebra::Vector3;
+use super::parameters::{
+    COULOMB, GRIPPER, JOINTS, PARK_POSE_DEG, RANGE_LOWER_DEG, RANGE_UPPER_DEG, TORQUE_LIMIT, WORKING_POSE_DEG,
+};
+use super::plant::joint_ranges;
+use super::rigid_body::{ArmModel, J5, radians};
 
 /// What the drives do; numbers as in the KU Leuven driver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -107,6 +107,9 @@ const CALIBRATION_WAY: [f64; JOINTS] = [0.0, -1.0, 1.0, -1.0, 0.0];
 /// A step back inside the soft limit before its exit is reported, as a share of the range.
 const SOFT_LIMIT_HYSTERESIS: f64 = 0.01;
 
+/// As far from a stop an arm that sinks onto it is not dropped, in rad.
+const NEAR_STOP: f64 = 0.05;
+
 #[derive(Debug, Clone, Copy)]
 enum DriveTask {
     Idle,
@@ -114,13 +117,33 @@ enum DriveTask {
     Calibrating { elapsed: f64, met: [bool; JOINTS] },
 }
 
-/// Arm and base with their drives.
+/// What the drives measure.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Measured {
+    /// Angles, in rad.
+    pub q: J5,
+    /// Speeds, in rad/s.
+    pub qd: J5,
+}
+
+/// What the drives do in the next period.
+#[derive(Debug, Clone, Copy)]
+pub struct DriveOutput {
+    /// In N m.
+    pub torque: J5,
+    /// The windings are shorted.
+    pub braked: bool,
+    /// For the base, in its frame.
+    pub twist: Twist2,
+}
+
+/// The drives of an arm and its base.
 #[derive(Debug, Clone)]
 pub struct Drives {
-    /// The arm.
-    pub arm: ArmPlant,
-    /// The base.
-    pub base: BasePlant,
+    /// The arm as it is meant to be.
+    model: ArmModel,
+    /// The arm as it was seen last.
+    pub measured: Measured,
     /// Limits and times.
     pub parameters: DriveParameters,
     /// Torques applied in the last update, in N m.
@@ -144,12 +167,12 @@ pub struct Drives {
 }
 
 impl Drives {
-    /// Drives off, not calibrated.
-    pub fn new(arm: ArmPlant) -> Self {
-        let target = arm.q;
+    /// Drives off, not calibrated, of an arm that is at `q`.
+    pub fn new(q: J5) -> Self {
+        let (measured, target) = (Measured { q, qd: J5::zeros() }, q);
         Self {
-            arm,
-            base: BasePlant::default(),
+            model: ArmModel::youbot(GRIPPER.mass, 1.0),
+            measured,
             parameters: DriveParameters::default(),
             torque: J5::zeros(),
             handover: Handover::default(),
@@ -230,8 +253,8 @@ impl Drives {
     /// Whatever is under way ends: a quick stop, then the drives hold the arm where it came to rest. The base stands.
     pub fn hold(&mut self) {
         self.task = DriveTask::Idle;
-        self.target = self.arm.q;
-        self.target_speed = self.arm.qd;
+        self.target = self.measured.q;
+        self.target_speed = self.measured.qd;
         self.resumes |= self.mode == DriveMode::Torque;
         self.mode = DriveMode::Positioning;
         self.handover.begin();
@@ -297,22 +320,23 @@ impl Drives {
         }
         self.hold();
         self.resumes = false;
-        let from = self.arm.q;
+        let from = self.measured.q;
         // A quintic's peak speed is 15/8 of its mean.
         let duration = ((to - from).amax() / MOTION_SPEED * 1.875).max(0.2);
         self.task = DriveTask::Moving { from, to, elapsed: 0.0, duration };
         Ok(())
     }
 
-    /// One update of `dt` seconds. Commands come with their age in s; `push` is a force on the tool, in the world.
+    /// One update of `dt` seconds: what is done until the next one. Commands come with their age in s.
     pub fn update(
         &mut self,
+        measured: Measured,
         effort: Option<(J5, f64)>,
         twist: Option<(Twist2, f64)>,
-        push: &Vector3<f64>,
         dt: f64,
         report: &mut impl FnMut(DriveHappening),
-    ) {
+    ) -> DriveOutput {
+        self.measured = measured;
         self.advance_task(dt, report);
         let command = match twist {
             // The base is heard while torques are: whoever stops the arm stops the base.
@@ -338,18 +362,18 @@ impl Drives {
         };
         torque = self.handover.over(&torque, &self.torque, dt);
         if self.mode == DriveMode::Torque {
-            let gained = (self.arm.qd - self.last_speed) / dt;
-            torque = within_speed(&torque, &self.arm.qd, &gained, &self.parameters.tau_max);
+            let gained = (self.measured.qd - self.last_speed) / dt;
+            torque = within_speed(&torque, &self.measured.qd, &gained, &self.parameters.tau_max);
         }
         for i in 0..JOINTS {
             torque[i] = torque[i].clamp(-self.parameters.tau_max[i], self.parameters.tau_max[i]);
         }
-        self.last_speed = self.arm.qd;
+        self.last_speed = self.measured.qd;
         self.torque = ramped(&self.torque, &torque, dt);
+        self.watch_limits(report);
         // Windings are shorted when no torque is left.
         let braked = self.mode == DriveMode::MotorStop && self.torque == J5::zeros();
-        advance(&mut self.arm, &mut self.base, &self.torque, command, push, braked, dt);
-        self.watch_limits(report);
+        DriveOutput { torque: self.torque, braked, twist: command }
     }
 
     fn advance_task(&mut self, dt: f64, report: &mut impl FnMut(DriveHappening)) {
@@ -369,7 +393,7 @@ impl Drives {
                 if over >= 0.0 {
                     self.target_speed = J5::zeros();
                     // The motion has ended when the arm is there, not when it should be.
-                    if (self.arm.q - to).amax() < ARRIVAL_ERROR {
+                    if (self.measured.q - to).amax() < ARRIVAL_ERROR {
                         self.task = DriveTask::Idle;
                         report(DriveHappening::Arrived);
                     } else if over > ARRIVAL_TIME {
@@ -386,8 +410,8 @@ impl Drives {
                     }
                     self.target[i] += CALIBRATION_WAY[i] * CALIBRATION_SPEED * dt;
                     // Behind its target and standing: something is in the way.
-                    let behind = (self.target[i] - self.arm.q[i]) * CALIBRATION_WAY[i];
-                    met[i] = behind > CONTACT_ERROR && self.arm.qd[i].abs() < 0.1 * CALIBRATION_SPEED;
+                    let behind = (self.target[i] - self.measured.q[i]) * CALIBRATION_WAY[i];
+                    met[i] = behind > CONTACT_ERROR && self.measured.qd[i].abs() < 0.1 * CALIBRATION_SPEED;
                 }
                 if met.iter().all(|m| *m) {
                     self.task = DriveTask::Idle;
@@ -406,14 +430,14 @@ impl Drives {
 
     fn is_at_stop(&self, i: usize) -> bool {
         let stop = if CALIBRATION_WAY[i] < 0.0 { RANGE_LOWER_DEG[i] } else { RANGE_UPPER_DEG[i] };
-        (self.arm.q[i] - stop.to_radians()).abs() < 0.02
+        (self.measured.q[i] - stop.to_radians()).abs() < 0.02
     }
 
     fn position_control(&self) -> J5 {
-        let mut out = self.arm.model.gravity(&self.arm.posture());
+        let mut out = self.model.gravity(&self.model.posture(&self.measured.q));
         for i in 0..JOINTS {
-            out[i] += POSITION_GAIN[i] * (self.target[i] - self.arm.q[i])
-                + SPEED_GAIN[i] * (self.target_speed[i] - self.arm.qd[i]);
+            out[i] += POSITION_GAIN[i] * (self.target[i] - self.measured.q[i])
+                + SPEED_GAIN[i] * (self.target_speed[i] - self.measured.qd[i]);
         }
         out
     }
@@ -421,7 +445,7 @@ impl Drives {
     /// Share of its half-range that joint `i` is off its middle; its sign.
     fn excursion(&self, i: usize) -> f64 {
         let (lower, upper) = joint_ranges();
-        (self.arm.q[i] - 0.5 * (lower[i] + upper[i])) / (0.5 * (upper[i] - lower[i]))
+        (self.measured.q[i] - 0.5 * (lower[i] + upper[i])) / (0.5 * (upper[i] - lower[i]))
     }
 
     /// `effort` with what pushes outward reduced near the limits.
@@ -452,26 +476,23 @@ impl Drives {
         }
     }
 
-    /// Switches the drives off and lets the arm settle for a second; answers how far the tool came down, in m.
-    pub fn switch_off(&mut self) -> f64 {
+    /// Switches the drives off; whether the arm stays where it is, or nearly so.
+    pub fn switch_off(&mut self) -> bool {
         self.task = DriveTask::Idle;
         self.mode = DriveMode::MotorStop;
         self.torque = J5::zeros();
         self.handover = Handover::default();
-        let before = self.arm.posture().tool.z;
-        for _ in 0..1000 {
-            advance(
-                &mut self.arm,
-                &mut self.base,
-                &J5::zeros(),
-                Twist2::default(),
-                &Vector3::zeros(),
-                true,
-                super::robot::CONTROL_PERIOD,
-            );
-        }
-        self.arm.qd = J5::zeros();
-        before - self.arm.posture().tool.z
+        self.is_carried()
+    }
+
+    /// Whether friction or a stop that is near carries each joint against gravity.
+    fn is_carried(&self) -> bool {
+        let (lower, upper) = joint_ranges();
+        let weight = self.model.gravity(&self.model.posture(&self.measured.q));
+        (0..JOINTS).all(|i| {
+            let stop = if weight[i] > 0.0 { lower[i] } else { upper[i] };
+            weight[i].abs() <= COULOMB[i] || (self.measured.q[i] - stop).abs() < NEAR_STOP
+        })
     }
 }
 

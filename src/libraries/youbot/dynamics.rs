@@ -2,6 +2,7 @@
 
 use super::base::Twist2;
 use super::handover::TORQUE_SLEW;
+use super::impedance::{ENGAGE, FADE};
 use super::parameters::{COULOMB, FRICTION_SLOPE, JOINTS, TORQUE_LIMIT, WORKING_POSE_DEG};
 use super::plant::joint_ranges;
 use super::rigid_body::{ArmModel, J5, Jacobian, Posture, radians};
@@ -52,6 +53,13 @@ impl Default for DynamicsParameters {
     }
 }
 
+impl DynamicsParameters {
+    /// Whether the base gives way to the tool force: eight degrees of freedom.
+    pub fn yields(&self) -> bool {
+        self.force_gain.iter().any(|gain| *gain > 0.0)
+    }
+}
+
 /// Share of a joint's range within which the soft limits are silent.
 const WORKING_RANGE: f64 = 0.95;
 /// Damping of the operational-space inverse near singular poses, in 1/kg.
@@ -71,6 +79,8 @@ pub struct Dynamics {
     pub parameters: DynamicsParameters,
     /// Torque of the coupling (force and posture), in N m: whoever stops asking for it suddenly, it goes along a ramp.
     coupling: J5,
+    /// How far the base yields because the other one does, 0 to 1.
+    mutual: f64,
 }
 
 /// What the coupling wants of the law.
@@ -80,6 +90,9 @@ pub struct Coupled {
     pub force: Vector3<f64>,
     /// How much of the coupling is in force, 0 to 1: that much of the posture control and of the base's motion.
     pub engaged: f64,
+    /// The other robot's base yields too. One base that yields to an arm that cannot follow it runs away from the hand: eight
+    /// degrees of freedom are those of both robots.
+    pub peer_yields: bool,
 }
 
 /// What the law answers.
@@ -126,7 +139,7 @@ impl ToolSpace {
 impl Dynamics {
     /// A law for an arm.
     pub fn new(model: ArmModel) -> Self {
-        Self { model, parameters: DynamicsParameters::default(), coupling: J5::zeros() }
+        Self { model, parameters: DynamicsParameters::default(), coupling: J5::zeros(), mutual: 0.0 }
     }
 
     /// One step of `dt` seconds. `coupled`: what the coupling wants; none: nothing, or it is not known any more, and only
@@ -146,18 +159,20 @@ impl Dynamics {
             torque[i] += p.friction_comp * COULOMB[i] * (qd[i] / FRICTION_SLOPE).tanh();
         }
         let (mut twist, mut coupling) = (Twist2::default(), J5::zeros());
-        if let Some(Coupled { force, engaged }) = coupled.filter(|coupled| coupled.engaged > 0.0) {
+        let mutual = coupled.is_some_and(|coupled| coupled.peer_yields);
+        self.mutual = (self.mutual + if mutual { dt / ENGAGE } else { -dt / FADE }).clamp(0.0, 1.0);
+        if let Some(Coupled { force, engaged, .. }) = coupled.filter(|coupled| coupled.engaged > 0.0) {
             let arm: Jacobian = jacobian.fixed_columns::<JOINTS>(3).into_owned();
             coupling = arm.tr_mul(force);
             let tool = ToolSpace::of(&self.model, &at, &arm);
             if let Some(tool) = &tool {
                 coupling += self.posture_torque(tool, q, qd) * *engaged;
             }
-            if p.force_gain.iter().any(|g| *g > 0.0) {
+            if p.yields() && self.mutual > 0.0 {
                 let base = jacobian.fixed_columns::<3>(0);
-                let wrench = base.tr_mul(force);
+                let wrench = base.tr_mul(force) * self.mutual;
                 let off = Vector3::new(at.tool.x - p.r_nominal[0], at.tool.y - p.r_nominal[1], 0.0);
-                let home = off * (p.recenter_gain * engaged);
+                let home = off * (p.recenter_gain * engaged * self.mutual);
                 twist = Twist2 {
                     vx: p.force_gain.x * wrench.x + home.x,
                     vy: p.force_gain.y * wrench.y + home.y,
@@ -201,6 +216,7 @@ impl Dynamics {
     /// Forgets the past.
     pub fn reset(&mut self) {
         self.coupling = J5::zeros();
+        self.mutual = 0.0;
     }
 }
 
@@ -263,15 +279,21 @@ mod tests {
         law.parameters.force_gain = Vector3::new(0.1, 0.1, 0.1);
         let q = radians([0.0, -30.0, 100.0, 60.0, 0.0]);
         let tool = Tool::of(&model, &q, &J5::zeros(), Default::default(), Default::default());
-        let pull = Coupled { force: Vector3::new(2.0, 0.0, 0.0), engaged: 1.0 };
+        let pull = Coupled { force: Vector3::new(2.0, 0.0, 0.0), engaged: 1.0, peer_yields: true };
         for coupled in [None, Some(Coupled { engaged: 0.0, ..pull })] {
             let out = law.update(&q, &J5::zeros(), &tool.jacobian, coupled.as_ref(), 0.001);
             assert_eq!(out.torque, model.gravity(&model.posture(&q)));
             assert_eq!(out.twist, Twist2::default());
         }
         law.parameters.r_nominal = [at_tool(&model, &q).x, at_tool(&model, &q).y];
-        let out = law.update(&q, &J5::zeros(), &tool.jacobian, Some(&pull), 0.001);
-        assert!((out.twist.vx - 0.2).abs() < 2e-3, "{:?}", out.twist);
+        let mut moves = |peer_yields: bool| {
+            let pull = Coupled { peer_yields, ..pull };
+            let update = |_| law.update(&q, &J5::zeros(), &tool.jacobian, Some(&pull), 0.001).twist;
+            (0..301).map(update).last().expect("updates")
+        };
+        assert_eq!(moves(false), Twist2::default(), "the other base stands");
+        assert!((moves(true).vx - 0.2).abs() < 2e-3, "{:?}", moves(true));
+        assert_eq!(moves(false), Twist2::default());
     }
 
     fn at_tool(model: &ArmModel, q: &J5) -> Vector3<f64> {
@@ -285,7 +307,7 @@ mod tests {
         let q = radians([20.0, -10.0, 80.0, 50.0, 10.0]);
         let tool = Tool::of(&model, &q, &J5::zeros(), Default::default(), Default::default());
         let alone = model.gravity(&model.posture(&q));
-        let pull = Coupled { force: Vector3::new(6.0, -8.0, 0.0), engaged: 1.0 };
+        let pull = Coupled { force: Vector3::new(6.0, -8.0, 0.0), engaged: 1.0, peer_yields: true };
         let (mut last, mut most) = (alone, 0.0_f64);
         for tick in 0..400 {
             let coupled = (tick < 200).then_some(&pull);

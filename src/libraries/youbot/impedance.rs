@@ -1,5 +1,9 @@
 //! The coupling's law: a spring and a damper between this tool and the other one.
+//!
+//! Coupling is mutual: force is put out while both robots want to be coupled. So both take hold within one time that a packet is under
+//! way, and when one lets go the other does, without waiting for anybody's coordinator.
 
+use super::tank::Tank;
 use nalgebra::Vector3;
 
 /// What the law is told, all in this robot's world frame.
@@ -11,11 +15,38 @@ pub struct Reference {
     pub velocity: Vector3<f64>,
     /// How long ago that was, in s.
     pub age: f64,
+    /// The other robot wants to be coupled.
+    pub coupled: bool,
+    /// Energy its coupling has given to this one's so far, in J.
+    pub energy: f64,
+}
+
+/// How the spring and the damper are kept from giving out more energy than they take in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum CouplingLaw {
+    /// Not at all: delayed, it takes damping of 1.2 times stiffness times delay to be stable.
+    #[default]
+    Position,
+    /// By a tank of energy at each end, whatever the delay.
+    Tank,
+}
+
+impl CouplingLaw {
+    /// From its name: `position` or `tank`.
+    pub fn named(name: &str) -> Option<Self> {
+        match name {
+            "position" => Some(Self::Position),
+            "tank" => Some(Self::Tank),
+            _ => None,
+        }
+    }
 }
 
 /// Parameters of the law (defaults: youBot coupling, one-way delay of a few milliseconds).
 #[derive(Debug, Clone, Copy)]
 pub struct ImpedanceParameters {
+    /// What keeps it passive.
+    pub law: CouplingLaw,
     /// In N/m.
     pub stiffness: f64,
     /// On the difference of velocities, in N s/m.
@@ -35,6 +66,7 @@ pub struct ImpedanceParameters {
 impl Default for ImpedanceParameters {
     fn default() -> Self {
         Self {
+            law: CouplingLaw::Position,
             stiffness: 150.0,
             damping_rel: 12.0,
             damping_abs: 5.0,
@@ -59,6 +91,7 @@ pub struct Impedance {
     ramp: Vector3<f64>,
     trust: f64,
     share: f64,
+    tank: Tank,
 }
 
 /// What the law answers.
@@ -73,8 +106,8 @@ pub struct ImpedanceOutput {
 }
 
 impl Impedance {
-    /// One step of `dt` seconds. `coupled` is the port `ext_ref_mode`: while it is false the wanted force is computed and, once
-    /// it has faded, none put out.
+    /// One step of `dt` seconds. `coupled` is the port `ext_ref_mode`: while it is false, or the other robot's is, the wanted force is
+    /// computed and, once it has faded, none put out.
     ///
     /// Independent of any coordination the force fades within [`FADE`] when the reference is older than `ref_max_age`.
     pub fn update(
@@ -86,15 +119,18 @@ impl Impedance {
         dt: f64,
     ) -> ImpedanceOutput {
         let p = &self.parameters;
-        let raw = reference.map_or_else(Vector3::zeros, |r| {
-            (r.position + p.offset - position) * p.stiffness + (r.velocity - velocity) * p.damping_rel
-        });
+        let away = reference.map_or_else(Vector3::zeros, |r| r.position + p.offset - position);
+        let approach = reference.map_or_else(Vector3::zeros, |r| r.velocity - velocity);
+        let raw = away * p.stiffness + approach * p.damping_rel;
         let raw_norm = raw.norm();
+        let coupled = coupled && reference.is_some_and(|r| r.coupled);
         let fresh = reference.is_some_and(|r| r.age <= p.ref_max_age);
         self.trust = (self.trust + if fresh { dt / FADE } else { -dt / FADE }).clamp(0.0, 1.0);
         self.share = (self.share + if coupled { dt / ENGAGE } else { -dt / FADE }).clamp(0.0, 1.0);
         if self.share == 0.0 {
             self.ramp = Vector3::zeros();
+            // What a spring between the two tools holds: half of it at each end.
+            self.tank = Tank::with(0.25 * p.stiffness * away.norm_squared()).after(&self.tank);
             return ImpedanceOutput { raw_norm, ..ImpedanceOutput::default() };
         }
         let wanted = if raw_norm > p.f_max { raw * (p.f_max / raw_norm) } else { raw };
@@ -103,7 +139,16 @@ impl Impedance {
         let length = step.norm();
         self.ramp += if length > most { step * (most / length) } else { step };
         let engaged = self.share * self.trust;
-        ImpedanceOutput { force: (self.ramp - velocity * p.damping_abs) * engaged, engaged, raw_norm }
+        let mut force = (self.ramp - velocity * p.damping_abs) * engaged;
+        if p.law == CouplingLaw::Tank {
+            force = self.tank.update(&force, position, velocity, reference.map(|r| r.energy), dt);
+        }
+        ImpedanceOutput { force, engaged, raw_norm }
+    }
+
+    /// Energy given to the other robot's coupling so far, in J.
+    pub fn energy_sent(&self) -> f64 {
+        self.tank.sent()
     }
 
     /// Forgets the past: the force starts from zero.
@@ -111,6 +156,7 @@ impl Impedance {
         self.ramp = Vector3::zeros();
         self.trust = 0.0;
         self.share = 0.0;
+        self.tank = Tank::default();
     }
 }
 
@@ -121,7 +167,8 @@ mod tests {
     const DT: f64 = 0.001;
 
     fn away(age: f64) -> Reference {
-        Reference { position: Vector3::new(0.15, 0.0, 0.0), velocity: Vector3::zeros(), age }
+        let position = Vector3::new(0.15, 0.0, 0.0);
+        Reference { position, velocity: Vector3::zeros(), age, coupled: true, energy: 0.0 }
     }
 
     #[test]
@@ -130,6 +177,19 @@ mod tests {
         let out = law.update(&Vector3::zeros(), &Vector3::zeros(), Some(&away(0.005)), false, DT);
         assert_eq!(out.force, Vector3::zeros());
         assert!((out.raw_norm - 22.5).abs() < 1e-9);
+    }
+
+    #[test]
+    fn alone_nobody_is_coupled() {
+        let mut law = Impedance::default();
+        let mut force = |coupled: bool, ticks: usize| {
+            let reference = Reference { coupled, ..away(0.005) };
+            let update = |_| law.update(&Vector3::zeros(), &Vector3::zeros(), Some(&reference), true, DT);
+            (0..ticks).map(update).last().expect("ticks").force.norm()
+        };
+        assert_eq!(force(false, 1000), 0.0);
+        assert!(force(true, 1000) > 9.0);
+        assert_eq!(force(false, 101), 0.0, "the other one lets go: so does this, within FADE");
     }
 
     #[test]

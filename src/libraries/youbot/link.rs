@@ -1,5 +1,6 @@
 //! What travels between the two robots, and how good the link is.
 
+use super::peer_clock::{Moments, PeerClock};
 use std::collections::VecDeque;
 
 crate::runtime::record! {
@@ -10,16 +11,31 @@ crate::runtime::record! {
         pub epoch: i64,
         /// Counts packets of an epoch.
         pub seq: i64,
-        /// When it was sent, ns of the common clock.
+        /// When it was sent, ns of the sender's clock.
         pub stamp: i64,
+        /// What the sender had heard of the receiver last.
+        pub echo: Echo,
         /// Tool position in the sender's world, m.
         pub p: [f64; 3],
         /// Tool velocity, m/s.
         pub v: [f64; 3],
         /// The wanted force has been small for a while.
         pub aligned: bool,
-        /// The coupling is engaged.
+        /// The sender wants to be coupled.
         pub copying: bool,
+        /// The sender's base yields: eight degrees of freedom.
+        pub yields: bool,
+        /// Energy that the sender's coupling has given to the receiver's so far, J (the law `tank`).
+        pub energy: f64,
+    }
+
+    /// What was heard of the other robot last, for it to measure the time under way.
+    #[derive(Copy, Default)]
+    pub struct Echo {
+        /// When it was sent, ns of the clock of whoever sent it; 0: nothing was heard.
+        pub stamp: i64,
+        /// When it was heard, ns of the clock of whoever heard it.
+        pub heard: i64,
     }
 
     /// How good the link is.
@@ -35,6 +51,10 @@ crate::runtime::record! {
         pub loss: f64,
         /// Of the newest packet.
         pub seq: i64,
+        /// The quickest way there and back of the last seconds, s.
+        pub round_trip: f64,
+        /// The other robot's clock minus this one's, s.
+        pub clock_offset: f64,
     }
 
     /// What the other robot says of itself.
@@ -44,8 +64,10 @@ crate::runtime::record! {
         pub epoch: i64,
         /// Its wanted force has been small for a while.
         pub aligned: bool,
-        /// Its coupling is engaged.
+        /// It wants to be coupled.
         pub copying: bool,
+        /// Its base yields: eight degrees of freedom.
+        pub yields: bool,
         /// It began anew within the last [`RESTART_SHOWN`] seconds.
         pub restarted: bool,
     }
@@ -64,6 +86,7 @@ pub struct LinkReceiver {
     arrived: f64,
     transit: f64,
     jitter: f64,
+    clock: PeerClock,
     /// Moment (s) and number of the packets of the last second.
     arrivals: VecDeque<(f64, i64)>,
     /// Over how long loss is counted, in s.
@@ -79,6 +102,7 @@ impl Default for LinkReceiver {
             arrived: 0.0,
             transit: 0.0,
             jitter: 0.0,
+            clock: PeerClock::default(),
             arrivals: VecDeque::with_capacity(ARRIVALS),
             window: 1.0,
             max_seq_gap: 50,
@@ -88,9 +112,9 @@ impl Default for LinkReceiver {
 
 impl LinkReceiver {
     /// Takes a packet in at `now` (s). Late ones count for the loss, and for nothing else.
-    #[allow(clippy::cast_precision_loss)]
     pub fn take(&mut self, packet: Packet, now: f64) {
-        let transit = now - packet.stamp as f64 * 1e-9;
+        // By two clocks: of use where two of them are compared.
+        let transit = now - seconds(packet.stamp);
         if let Some(newest) = &self.newest {
             let same = newest.epoch == packet.epoch && packet.seq > newest.seq - self.max_seq_gap;
             if !same {
@@ -98,6 +122,7 @@ impl LinkReceiver {
                     return;
                 }
                 self.arrivals.clear();
+                self.clock = PeerClock::default();
             } else {
                 self.jitter += ((transit - self.transit).abs() - self.jitter) / 16.0;
             }
@@ -110,6 +135,14 @@ impl LinkReceiver {
         self.transit = transit;
         self.arrived = now;
         self.newest = Some(packet);
+        if packet.echo.stamp != 0 {
+            self.clock.take(Moments {
+                sent: seconds(packet.echo.stamp),
+                heard: seconds(packet.echo.heard),
+                answered: seconds(packet.stamp),
+                came: now,
+            });
+        }
     }
 
     fn note(&mut self, now: f64, seq: i64) {
@@ -124,21 +157,36 @@ impl LinkReceiver {
         self.newest.as_ref()
     }
 
-    /// How good the link is at `now` (s); none before the first packet.
+    /// What is sent back, so that the other robot can measure.
+    pub fn echo(&self) -> Echo {
+        self.newest.map_or_else(Echo::default, |newest| Echo { stamp: newest.stamp, heard: nanoseconds(self.arrived) })
+    }
+
+    /// When the newest packet was sent, by the receiver's clock, in s. None before a packet that went round has shown how
+    /// the two clocks differ: what is not heard by the other robot has no link.
+    pub fn sent(&self) -> Option<f64> {
+        let newest = self.newest?;
+        // Nothing comes before it is sent: where the ways differ the clocks are not known better than that.
+        self.clock.offset().map(|offset| (seconds(newest.stamp) - offset).min(self.arrived))
+    }
+
+    /// How good the link is at `now` (s); none before the first packet that went round.
     #[allow(clippy::cast_precision_loss)]
     pub fn stats(&mut self, now: f64) -> Option<LinkStats> {
-        let newest = self.newest?;
+        let (newest, sent) = (self.newest?, self.sent()?);
         while self.arrivals.front().is_some_and(|(at, _)| *at < now - self.window) {
             self.arrivals.pop_front();
         }
         let first = self.arrivals.iter().map(|(_, seq)| *seq).min().unwrap_or(newest.seq);
         let expected = (newest.seq - first + 1).max(1) as f64;
         Some(LinkStats {
-            age: now - newest.stamp as f64 * 1e-9,
+            age: now - sent,
             gap: now - self.arrived,
             jitter: self.jitter,
             loss: (1.0 - self.arrivals.len() as f64 / expected).clamp(0.0, 1.0),
             seq: newest.seq,
+            round_trip: self.clock.round_trip()?,
+            clock_offset: self.clock.offset()?,
         })
     }
 
@@ -146,8 +194,19 @@ impl LinkReceiver {
     pub fn reset(&mut self) {
         self.newest = None;
         self.jitter = 0.0;
+        self.clock = PeerClock::default();
         self.arrivals.clear();
     }
+}
+
+#[allow(clippy::cast_precision_loss)]
+fn seconds(nanoseconds: i64) -> f64 {
+    nanoseconds as f64 * 1e-9
+}
+
+#[allow(clippy::cast_possible_truncation)]
+fn nanoseconds(seconds: f64) -> i64 {
+    (seconds * 1e9).round() as i64
 }
 
 #[cfg(test)]
@@ -155,32 +214,47 @@ mod tests {
     use super::super::network::{Network, Quality};
     use super::*;
 
-    fn run(quality: Quality) -> LinkStats {
-        let mut net = Network::new(quality, 3);
-        let mut receiver = LinkReceiver::default();
+    /// Three seconds of packets both ways, the other's clock so far `ahead` (s).
+    fn run(quality: Quality, ahead: f64) -> LinkStats {
+        let mut nets = [Network::new(quality, 3), Network::new(quality, 4)];
+        let mut receivers = [LinkReceiver::default(), LinkReceiver::default()];
         let mut stats = None;
         for tick in 0..3000_i64 {
-            let now = tick as f64 * 0.001;
-            if tick % 4 == 0 {
-                net.send(now, Packet { seq: tick / 4, stamp: tick * 1_000_000, ..Packet::default() });
+            let times = [0, 1].map(|side| tick as f64 * 0.001 + if side == 1 { ahead } else { 0.0 });
+            for side in 0..2 {
+                if tick % 4 == 0 {
+                    let (stamp, echo) = (nanoseconds(times[side]), receivers[side].echo());
+                    let packet = Packet { seq: tick / 4, stamp, echo, ..Packet::default() };
+                    nets[side].send(times[0], packet);
+                }
+                while let Some(packet) = nets[1 - side].receive(times[0]) {
+                    receivers[side].take(packet, times[side]);
+                }
             }
-            while let Some(packet) = net.receive(now) {
-                receiver.take(packet, now);
-            }
-            stats = receiver.stats(now).or(stats);
+            stats = receivers[0].stats(times[0]).or(stats);
         }
         stats.expect("packets came")
     }
 
     #[test]
-    fn it_measures_what_the_network_does() {
-        let clean = run(Quality { delay: 0.005, ..Quality::default() });
-        assert!((0.005..0.0101).contains(&clean.age) && clean.gap < 0.0051 && clean.loss == 0.0, "{clean:?}");
-        assert!(clean.jitter < 1e-9);
-        let lossy = run(Quality { delay: 0.005, loss: 0.3, ..Quality::default() });
-        assert!((0.2..0.4).contains(&lossy.loss), "{lossy:?}");
-        let shaky = run(Quality { delay: 0.005, jitter: 0.02, ..Quality::default() });
-        assert!(shaky.jitter > 0.003 && shaky.loss < 0.05, "{shaky:?}");
+    fn it_measures_what_the_network_does_whatever_the_clocks_show() {
+        for ahead in [0.0, 1234.5, -0.3] {
+            let clean = run(Quality { delay: 0.005, ..Quality::default() }, ahead);
+            assert!((0.0049..0.0101).contains(&clean.age) && clean.gap < 0.0051 && clean.loss == 0.0, "{clean:?}");
+            assert!((clean.clock_offset - ahead).abs() < 1e-6 && clean.jitter < 1e-6, "{clean:?}");
+            let lossy = run(Quality { delay: 0.005, loss: 0.3, ..Quality::default() }, ahead);
+            assert!((0.2..0.4).contains(&lossy.loss), "{lossy:?}");
+            let shaky = run(Quality { delay: 0.005, jitter: 0.02, ..Quality::default() }, ahead);
+            assert!(shaky.jitter > 0.002 && shaky.loss < 0.05, "{shaky:?}");
+        }
+    }
+
+    #[test]
+    fn without_an_answer_there_is_no_link() {
+        let mut receiver = LinkReceiver::default();
+        receiver.take(Packet { seq: 1, stamp: 5, ..Packet::default() }, 0.1);
+        assert_eq!((receiver.stats(0.1), receiver.sent()), (None, None));
+        assert_eq!(receiver.echo(), Echo { stamp: 5, heard: 100_000_000 });
     }
 
     #[test]

@@ -9,10 +9,15 @@ pub mod handover;
 pub mod impedance;
 pub mod kinematics;
 pub mod link;
+pub mod motors;
 pub mod network;
 pub mod parameters;
+pub mod passivity;
+pub mod peer_clock;
 pub mod plant;
 pub mod rigid_body;
 pub mod robot;
+pub mod tank;
+pub mod world;
 
 pub use components::library;

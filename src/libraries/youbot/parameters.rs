@@ -75,6 +75,9 @@ pub const GEAR: [f64; JOINTS] = [156.0, 156.0, 100.0, 71.0, 71.0];
 /// Torque constants, in N m/A (Dv, L).
 pub const TORQUE_CONSTANT: [f64; JOINTS] = [0.0335, 0.0335, 0.0335, 0.051, 0.049];
 
+/// Counts of the encoders in a turn of the motor (Dv).
+pub const ENCODER_TICKS: f64 = 4000.0;
+
 /// Inertia of rotor and gearbox seen at the joint, in kg m² (D from M: `(rotor + gearbox) * gear²`).
 pub const REFLECTED_INERTIA: [f64; JOINTS] = [
     (1.35e-5 + 4.09e-7) * 156.0 * 156.0,
@@ -97,9 +100,6 @@ pub const VISCOUS: [f64; JOINTS] = [1.5, 1.0, 1.0, 0.3, 0.1];
 /// Speed at which compensated Coulomb friction is fully developed, in rad/s: `COULOMB * tanh(qd / FRICTION_SLOPE)`.
 /// Compensation must be softer than friction is, or it pushes a joint that stands.
 pub const FRICTION_SLOPE: f64 = 0.05;
-
-/// The same for the plant's own friction, in rad/s (assumed: close to a true Coulomb characteristic).
-pub const PLANT_FRICTION_SLOPE: f64 = 0.0001;
 
 /// Highest joint speed, in rad/s (U).
 pub const SPEED_LIMIT: f64 = 1.571;

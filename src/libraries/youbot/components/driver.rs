@@ -1,19 +1,16 @@
-//! `youbot.Driver`: the robot's driver, with the robot itself simulated behind it.
+//! `youbot.Driver`: the robot's driver.
 
 use super::aged;
-use super::samples::{DriverState, JointState, MotorStates, Odometry, Twist, stamp};
-use crate::libraries::youbot::drives::{DriveHappening, DriveMode, DriveParameters, Drives};
-use crate::libraries::youbot::parameters::{GEAR, GRIPPER, JOINTS, PARK_POSE_DEG, TORQUE_CONSTANT, TORQUE_LIMIT};
-use crate::libraries::youbot::plant::ArmPlant;
-use crate::libraries::youbot::rigid_body::{ArmModel, J5, radians};
+use super::samples::{DriverState, JointState, MotorStates, Odometry, PlantCommand, PlantState, Twist, stamp};
+use crate::libraries::youbot::drives::{DriveHappening, DriveMode, DriveOutput, DriveParameters, Drives, Measured};
+use crate::libraries::youbot::motors::{Encoders, HeatChange, HeatLimit};
+use crate::libraries::youbot::parameters::{GEAR, JOINTS, PARK_POSE_DEG, TORQUE_CONSTANT, TORQUE_LIMIT};
+use crate::libraries::youbot::rigid_body::{J5, radians};
 use crate::model::{EventName, Tunable};
 use crate::runtime::{Builder, Component, Context, EventOut, Failure, In, OperationAnswer, Out, Prop, Ticket};
-use nalgebra::Vector3;
 
-/// Falling by more than this when the drives go off is dropping the arm, in m.
-const DROP: f64 = 0.02;
-/// A push older than this has ended, in s.
-const PUSH_STALE: f64 = 0.05;
+/// An arm that was not heard for so long is not there any more: the field bus has failed, in s.
+const BUS_TIMEOUT: f64 = 0.02;
 /// Drives that take torques are watched: when whoever does was not heard for so long it has stopped, in s.
 const UNWATCHED: f64 = 0.04;
 /// What lasts is told again so much later, as monitors do it: who was elsewhere when it began still hears of it. In s.
@@ -23,9 +20,16 @@ const HEATING: f64 = 1.5;
 const HEAT_TIME: f64 = 120.0;
 const AMBIENT: f64 = 25.0;
 
+/// The fault of a motor that gave too much for too long.
+const I2T: &str = "i2t";
+
 /// Faults that `comm_fault` injects: the property's value, the event, the flag.
-const FAULTS: [(&str, &str, i64); 5] = [
+const FAULTS: [(&str, &str, i64); 9] = [
     ("overcurrent", "e_OVERCURRENT", 0x01),
+    ("undervoltage", "e_UNDERVOLTAGE", 0x02),
+    ("hall", "e_HALL_ERR", 0x10),
+    ("sine_comm", "e_SINE_COMM_INIT_ERR", 0x100),
+    (I2T, "e_I2T_EXCEEDED", 0x200),
     ("overtemp", "e_OVERTEMP", 0x04),
     ("ec_timeout", "e_EC_TIMEOUT", 0x40),
     ("encoder", "e_ENCODER_ERR", 0x20),
@@ -35,6 +39,10 @@ const FAULTS: [(&str, &str, i64); 5] = [
 /// What each of them is, for `davit types`.
 const FAULT_WORDS: [&str; FAULTS.len()] = [
     "A motor takes too much current; the drives hold, e_OVERCURRENT.",
+    "The drives have too little voltage; they hold, e_UNDERVOLTAGE.",
+    "A Hall sensor fails; the drives hold, e_HALL_ERR.",
+    "A motor does not find its commutation; the drives hold, e_SINE_COMM_INIT_ERR.",
+    "A motor has taken much current for long; the drives hold, e_I2T_EXCEEDED.",
     "A motor is too hot; the drives hold, e_OVERTEMP.",
     "The field bus did not answer in time; the drives hold, e_EC_TIMEOUT.",
     "An encoder tells nonsense; the drives hold, e_ENCODER_ERR.",
@@ -46,6 +54,7 @@ struct Events {
     soft_limit_exit: EventName,
     command_watchdog: EventName,
     base_watchdog: EventName,
+    cooled: EventName,
     calibrated: EventName,
     calibration_failed: EventName,
     arrived: EventName,
@@ -61,44 +70,51 @@ pub struct Driver {
     effort: In<J5>,
     cmd_twist: In<Twist>,
     gripper: In<i32>,
-    ext_force: In<Vector3<f64>>,
+    plant_state: In<PlantState>,
     watched: In<bool>,
     jointstate: Out<JointState>,
     odometry: Out<Odometry>,
     motor_states: Out<MotorStates>,
     driver_state: Out<DriverState>,
     control_mode: Out<u8>,
+    plant_command: Out<PlantCommand>,
     events: EventOut,
     tau_max: Prop<J5>,
-    q_start: Prop<J5>,
     cmd_timeout: Prop<f64>,
     base_timeout: Prop<f64>,
     soft_limit: Prop<f64>,
     scale_end: Prop<f64>,
-    friction_scale: Prop<f64>,
-    mass_scale: Prop<f64>,
+    encoders: Prop<bool>,
+    heat_limit: Prop<bool>,
     comm_fault: Prop<String>,
     ifname: Prop<String>,
     names: Events,
     drives: Drives,
+    counters: Encoders,
+    heat: HeatLimit,
     running: bool,
     motors: MotorStates,
     bus: DriverState,
     task: Option<Ticket>,
     /// For how long nobody has been watching, since that was told last, in s.
     unwatched: Option<f64>,
+    /// The same of the arm.
+    unheard: Option<f64>,
+    /// Where it was heard last.
+    plant: PlantState,
 }
 
 impl Component for Driver {
     fn new(b: &mut Builder<Self>) -> Self {
         b.describe(
-            "The youBot's driver, with arm and base simulated behind it (rigid-body dynamics, friction, stops, base lag). \
-             Drives start off; the arm then rests on its stops or sinks onto them.",
+            "The youBot's driver: of an arm and a base that are in youbot.World. Drives start off; the arm then rests on its \
+             stops or sinks onto them. An arm that is not heard any more for 20 ms: e_EC_TIMEOUT.",
         )
         .actuator()
+        .start_after("youbot.World")
         .on_configure(|c, _| {
-            let model = ArmModel::youbot(GRIPPER.mass, c.mass_scale.get());
-            c.drives = Drives::new(ArmPlant::new(model, c.q_start.get()));
+            c.drives = Drives::new(radians(PARK_POSE_DEG));
+            (c.counters, c.heat) = (Encoders::default(), HeatLimit::default());
             c.motors = MotorStates { temp: [AMBIENT; JOINTS], ..MotorStates::default() };
             c.bus = DriverState::default();
             if c.ifname.get_ref().is_empty() {
@@ -107,15 +123,22 @@ impl Component for Driver {
             Ok(())
         })
         .on_start(|c, _| {
+            let Some(state) = c.plant_state.get() else {
+                return Err("the arm is not heard (plant_state): start the world that it is in first".into());
+            };
+            c.drives.measured = Measured { q: state.pos.into(), qd: state.vel.into() };
+            c.plant = state;
             c.running = true;
+            (c.unwatched, c.unheard) = (None, None);
             Ok(())
         })
         .on_stop(|c, _| {
             c.running = false;
             c.task = None;
-            if c.drives.switch_off() > DROP {
+            if !c.drives.switch_off() {
                 c.events.raise(c.names.dropped);
             }
+            c.plant_command.write(PlantCommand { braked: true, ..PlantCommand::default() });
             Ok(())
         });
         b.doc("Changes what the drives do: 0 off, 1 hold a position, 6 take torques.").operation(
@@ -203,7 +226,7 @@ impl Component for Driver {
             effort: b.doc("Torques, heard in mode 6.").unit("N m").input("joint_effort_command"),
             cmd_twist: b.doc("Motion of the base, in its frame, heard in mode 6.").input("cmd_twist"),
             gripper: b.doc("1 opens, 0 closes the gripper.").input("gripper_cmd"),
-            ext_force: b.doc("What pushes the tool in the simulation, in the world.").unit("N").input("ext_force"),
+            plant_state: b.doc("Where arm and base are.").required().input("plant_state"),
             watched: b
                 .doc("Whatever whoever watches the robot writes. Silent for 40 ms in mode 6: e_watch_lost.")
                 .input("watched"),
@@ -212,18 +235,13 @@ impl Component for Driver {
             motor_states: b.doc("How the motors are.").output("motor_states"),
             driver_state: b.doc("How the field bus is.").output("driver_state"),
             control_mode: b.doc("What the drives do: 0, 1 or 6.").output("control_mode"),
+            plant_command: b.doc("What is done to arm and base.").output("plant_command"),
             events: b.doc("Limits, watchdogs, errors.").event_output("events"),
             tau_max: b
                 .doc("Largest torques.")
                 .unit("N m")
                 .range(0.0..=20.0)
                 .property("tau_max", J5::from(TORQUE_LIMIT)),
-            q_start: b
-                .doc("Where the arm is when the simulation begins, rad from candle.")
-                .unit("rad")
-                .range(-3.0..=3.0)
-                .tunable(Tunable::Unconfigured)
-                .property("q_start", radians(PARK_POSE_DEG)),
             cmd_timeout: b
                 .doc("Without a torque command for so long the drives hold by themselves.")
                 .unit("s")
@@ -242,17 +260,17 @@ impl Component for Driver {
                 .doc("Share of a joint's range at which no outward torque is left.")
                 .range(0.1..=1.0)
                 .property("scale_end", p.scale_end),
-            friction_scale: b
-                .doc("The simulated friction, as a multiple of the nominal one.")
-                .range(0.0..=10.0)
-                .property("friction_scale", 1.0),
-            mass_scale: b
-                .doc("The simulated masses, as a multiple of the nominal ones.")
-                .range(0.1..=3.0)
-                .tunable(Tunable::Unconfigured)
-                .property("mass_scale", 1.0),
+            encoders: b
+                .doc("Angles in whole counts of the encoders, speeds as differences of them; else as they truly are.")
+                .property("encoders", false),
+            heat_limit: b
+                .doc(
+                    "A motor gives tau_max for half a second and 80 % of it for ever (current squared times time); more: e_I2T_EXCEEDED. \
+                     Else tau_max for ever.",
+                )
+                .property("heat_limit", false),
             comm_fault: b
-                .doc("Fault to inject: none, overcurrent, overtemp, ec_timeout, encoder, emergency.")
+                .doc(&format!("Fault to inject: none, {}.", FAULTS.map(|(name, ..)| name).join(", ")))
                 .property("comm_fault", "none".to_owned()),
             ifname: b
                 .doc("The network interface of the field bus.")
@@ -263,6 +281,7 @@ impl Component for Driver {
                 soft_limit_exit: b.event("e_JNT_SOFT_LIMIT_EXEEDED_EXIT"),
                 command_watchdog: b.event("e_cmd_watchdog"),
                 base_watchdog: b.event("e_base_cmd_watchdog"),
+                cooled: b.event("e_I2T_EXCEEDED_EXIT"),
                 calibrated: b.event("e_calibrated"),
                 calibration_failed: b.event("e_calibration_failed"),
                 arrived: b.event("e_arrived"),
@@ -272,33 +291,37 @@ impl Component for Driver {
                 unwatched: b.event("e_watch_lost"),
                 faults: FAULTS.map(|(_, event, _)| b.event(event)),
             },
-            drives: Drives::new(ArmPlant::new(ArmModel::youbot(GRIPPER.mass, 1.0), radians(PARK_POSE_DEG))),
+            drives: Drives::new(radians(PARK_POSE_DEG)),
             running: false,
             motors: MotorStates::default(),
             bus: DriverState::default(),
             task: None,
+            counters: Encoders::default(),
+            heat: HeatLimit::default(),
             unwatched: None,
+            unheard: None,
+            plant: PlantState::default(),
         }
     }
 
     fn update(&mut self, cx: &mut Context) {
+        let most = self.tau_max.get();
         self.drives.parameters = DriveParameters {
-            tau_max: self.tau_max.get(),
+            tau_max: self.heat.of(&most),
             cmd_timeout: self.cmd_timeout.get(),
             base_timeout: self.base_timeout.get(),
             soft_limit: self.soft_limit.get(),
             scale_end: self.scale_end.get(),
         };
-        self.drives.arm.friction_scale = self.friction_scale.get();
         if self.comm_fault.changed() {
             let wanted = self.comm_fault.get_ref().clone();
             self.fail(&wanted);
         }
         let effort = aged(&mut self.effort, cx);
         let twist = aged(&mut self.cmd_twist, cx).map(|(t, age)| (t.into(), age));
-        // Nobody pushes on after the hand is gone.
-        let push =
-            aged(&mut self.ext_force, cx).filter(|(_, age)| *age <= PUSH_STALE).map(|(f, _)| f).unwrap_or_default();
+        let (plant, age) = aged(&mut self.plant_state, cx).unwrap_or((self.plant, f64::INFINITY));
+        self.plant = plant;
+        self.unheard = self.again(age > BUS_TIMEOUT, self.unheard, cx.dt(), |c| _ = c.fail("ec_timeout"));
         let _ = self.gripper.take();
         if self.task.as_ref().is_some_and(Ticket::is_cancelled) {
             // Nobody waits any more: the motion ends where it is.
@@ -306,7 +329,12 @@ impl Component for Driver {
             self.drives.hold();
         }
         let (events, names, task) = (&mut self.events, &self.names, &mut self.task);
-        self.drives.update(effort, twist, &push, cx.dt(), &mut |what| match what {
+        let counted = self.counters.read(&plant.pos.into(), cx.dt());
+        let measured = match self.encoders.get() {
+            true => counted,
+            false => Measured { q: plant.pos.into(), qd: plant.vel.into() },
+        };
+        let driven = self.drives.update(measured, effort, twist, cx.dt(), &mut |what| match what {
             DriveHappening::SoftLimit => events.raise(names.soft_limit),
             DriveHappening::SoftLimitExit => events.raise(names.soft_limit_exit),
             DriveHappening::CommandWatchdog => events.raise(names.command_watchdog),
@@ -330,15 +358,18 @@ impl Component for Driver {
                 }
             }
         });
+        if !self.heat_limit.get() {
+            self.heat = HeatLimit::default();
+        } else if let Some(change) = self.heat.update(&driven.torque, &most, cx.dt()) {
+            match change {
+                HeatChange::Exceeded => _ = self.fail(I2T),
+                HeatChange::Exit => self.events.raise(self.names.cooled),
+            }
+        }
         let lost = aged(&mut self.watched, cx).is_some_and(|(_, age)| age > UNWATCHED);
-        let told = self.unwatched.map(|since| since + cx.dt()).filter(|since| *since < AGAIN);
-        self.unwatched = (lost && self.drives.mode() == DriveMode::Torque).then(|| {
-            told.unwrap_or_else(|| {
-                self.events.raise(self.names.unwatched);
-                0.0
-            })
-        });
-        self.publish(cx);
+        let lost = lost && self.drives.mode() == DriveMode::Torque;
+        self.unwatched = self.again(lost, self.unwatched, cx.dt(), |c| c.events.raise(c.names.unwatched));
+        self.publish(&plant, &driven, cx);
     }
 }
 
@@ -357,6 +388,17 @@ impl Driver {
         }
     }
 
+    /// Tells what is so, and tells it again as long as it lasts; since when it was told last, in s.
+    fn again(&mut self, so: bool, told: Option<f64>, dt: f64, tell: impl FnOnce(&mut Self)) -> Option<f64> {
+        let told = told.map(|since| since + dt).filter(|since| *since < AGAIN);
+        so.then(|| {
+            told.unwrap_or_else(|| {
+                tell(self);
+                0.0
+            })
+        })
+    }
+
     /// A fault of that name happens; false: there is none.
     fn fail(&mut self, wanted: &str) -> bool {
         let Some(i) = FAULTS.iter().position(|(name, ..)| *name == wanted) else { return false };
@@ -368,15 +410,13 @@ impl Driver {
         true
     }
 
-    fn publish(&mut self, cx: &Context) {
+    fn publish(&mut self, plant: &PlantState, driven: &DriveOutput, cx: &Context) {
+        let (torque, twist) = (driven.torque.into(), driven.twist.into());
+        self.plant_command.write(PlantCommand { torque, braked: driven.braked, twist });
         let d = &self.drives;
-        self.jointstate.write(JointState {
-            pos: d.arm.q.into(),
-            vel: d.arm.qd.into(),
-            eff: d.torque.into(),
-            stamp: stamp(cx.now()),
-        });
-        self.odometry.write(Odometry::new(d.base.pose, d.base.twist));
+        let (pos, vel) = (d.measured.q.into(), d.measured.qd.into());
+        self.jointstate.write(JointState { pos, vel, eff: torque, stamp: stamp(cx.now()) });
+        self.odometry.write(plant.base);
         for i in 0..JOINTS {
             let current = d.torque[i] / (TORQUE_CONSTANT[i] * GEAR[i]);
             let heat = AMBIENT + HEATING * current * current - self.motors.temp[i];

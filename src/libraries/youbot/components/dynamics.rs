@@ -3,6 +3,7 @@
 use super::aged;
 use super::samples::{JointState, Odometry, Twist, seconds_since};
 use crate::libraries::youbot::dynamics::{Coupled, Dynamics, DynamicsParameters, Jacobian8};
+use crate::libraries::youbot::link::PeerState;
 use crate::libraries::youbot::parameters::GRIPPER;
 use crate::libraries::youbot::rigid_body::{ArmModel, J5};
 use crate::model::Tunable;
@@ -16,12 +17,14 @@ const STALE: f64 = 0.02;
 pub struct DynamicsComponent {
     f_des: In<Vector3<f64>>,
     engaged: In<f64>,
+    peer_state: In<PeerState>,
     jointstate: In<JointState>,
     jacobian: In<[f64; 24]>,
     odometry: In<Odometry>,
     effort: Out<J5>,
     base_twist: Out<Twist>,
     tau_sat: Out<u8>,
+    yields: Out<bool>,
     force_gain: Prop<Vector3<f64>>,
     gravity_gain: Prop<f64>,
     payload: Prop<f64>,
@@ -61,12 +64,19 @@ impl Component for DynamicsComponent {
             engaged: b
                 .doc("How much of the coupling is in force, as Cart_Impedance gives it. Not connected: none.")
                 .input("engaged"),
+            peer_state: b
+                .doc(
+                    "Whether the other base yields too, as Link_Rx gives it: eight degrees of freedom are those of both robots. \
+                     Not connected: it does.",
+                )
+                .input("peer_state"),
             jointstate: b.doc("What the joints measure.").required().input("jointstate"),
             jacobian: b.doc("As Arm_Kinematics gives it.").required().input("jacobian"),
             odometry: b.doc("How the base moves.").input("odometry"),
             effort: b.doc("Torques.").unit("N m").output("joint_effort_command"),
             base_twist: b.doc("Wanted motion of the base, in its frame.").output("base_twist"),
             tau_sat: b.doc("Bit i: joint i+1 is at its torque limit.").output("tau_sat"),
+            yields: b.doc("Whether the base is to yield: force_gain is not zero.").output("yields"),
             force_gain: b
                 .doc("How the base gives way: (m/s)/N, (m/s)/N, (rad/s)/(N m). All zero: five degrees of freedom.")
                 .range(0.0..=1.0)
@@ -133,7 +143,11 @@ impl Component for DynamicsComponent {
         let fresh = |age: f64| age <= STALE && jacobian.is_some();
         let force = aged(&mut self.f_des, cx).filter(|(_, age)| fresh(*age));
         let engaged = aged(&mut self.engaged, cx).filter(|(_, age)| fresh(*age));
-        let coupled = force.zip(engaged).map(|((force, _), (engaged, _))| Coupled { force, engaged });
+        let peer_yields = match self.peer_state.get() {
+            Some(peer) => peer.yields,
+            None => !self.peer_state.is_connected(),
+        };
+        let coupled = force.zip(engaged).map(|((force, _), (engaged, _))| Coupled { force, engaged, peer_yields });
         let jacobian = jacobian.map_or_else(Jacobian8::zeros, |(flat, _)| Jacobian8::from_column_slice(&flat));
         let (q, qd) = (J5::from(joints.pos), J5::from(joints.vel));
         let out = self.law.update(&q, &qd, &jacobian, coupled.as_ref(), cx.dt());
@@ -142,5 +156,6 @@ impl Component for DynamicsComponent {
         let known = self.odometry.sample().is_some_and(|o| seconds_since(cx.now(), o.at) <= STALE);
         self.base_twist.write(if known { out.twist.into() } else { Twist::default() });
         self.tau_sat.write(out.saturated);
+        self.yields.write(self.law.parameters.yields());
     }
 }

@@ -1,8 +1,9 @@
 //! `youbot.Cart_Impedance`: the coupling's spring and damper.
 
 use super::samples::{ExtRef, ToolPose, ToolTwist, stamp};
-use crate::libraries::youbot::impedance::{Impedance, ImpedanceParameters, Reference};
-use crate::runtime::{Builder, Component, Context, In, OperationAnswer, Out, Prop};
+use crate::libraries::youbot::impedance::{CouplingLaw, Impedance, ImpedanceParameters, Reference};
+use crate::model::Tunable;
+use crate::runtime::{Builder, Component, Context, Failure, In, OperationAnswer, Out, Prop};
 use nalgebra::Vector3;
 
 /// The component.
@@ -17,6 +18,8 @@ pub struct CartImpedance {
     ref_age: Out<f64>,
     active: Out<bool>,
     engaged: Out<f64>,
+    energy_sent: Out<f64>,
+    law: Prop<String>,
     stiffness: Prop<f64>,
     damping_rel: Prop<f64>,
     damping_abs: Prop<f64>,
@@ -24,7 +27,7 @@ pub struct CartImpedance {
     f_rate: Prop<f64>,
     ref_max_age: Prop<f64>,
     offset: Prop<Vector3<f64>>,
-    law: Impedance,
+    coupling: Impedance,
     recent: Recent,
 }
 
@@ -54,17 +57,21 @@ impl Component for CartImpedance {
         let p = ImpedanceParameters::default();
         b.describe(
             "The force that pulls this tool to the other robot's: spring, damper, bounded, ramped. It is always computed \
-             and put out only while ext_ref_mode is true, taking hold and letting go along ramps; it fades by itself when \
-             the reference grows stale.",
+             and put out only while ext_ref_mode is true here and at the other robot, taking hold and letting go along ramps; it \
+             fades by itself when the reference grows stale.",
         )
         .start_after("youbot.Arm_Kinematics")
+        .on_configure(|c, _| match CouplingLaw::named(c.law.get_ref()) {
+            Some(_) => Ok(()),
+            None => Err(Failure(format!("no law `{}`: position or tank", c.law.get_ref()))),
+        })
         .on_start(|c, _| {
-            c.law.reset();
+            c.coupling.reset();
             c.recent = Recent::default();
             Ok(())
         });
         b.doc("The force begins from zero again.").no_effect().operation("reset", |c, _, (): ()| {
-            c.law.reset();
+            c.coupling.reset();
             OperationAnswer::Done(())
         });
         Self {
@@ -73,7 +80,7 @@ impl Component for CartImpedance {
             ext_ref: b.doc("Where the other tool was.").required().input("ext_ref"),
             ext_ref_mode: b.doc("Whether the force is put out. Never written: no.").input("ext_ref_mode"),
             f_des: b
-                .doc("Force wanted on the tool, in the world; zero 0.1 s after ext_ref_mode became false.")
+                .doc("Force wanted on the tool, in the world; zero 0.1 s after ext_ref_mode became false, here or at the other robot.")
                 .unit("N")
                 .output("f_des"),
             f_raw_norm: b.doc("Norm of the force it would want, coupled or not.").unit("N").output("f_raw_norm"),
@@ -81,6 +88,17 @@ impl Component for CartImpedance {
             ref_age: b.doc("Age of the reference; not written before the first one.").unit("s").output("ref_age"),
             active: b.doc("Whether the force is to be put out: ext_ref_mode.").output("active"),
             engaged: b.doc("How much of the coupling is in force: from 0, let go of, to 1.").output("engaged"),
+            energy_sent: b
+                .doc("Energy given to the other robot's coupling so far, for Link_Tx (law `tank`).")
+                .unit("J")
+                .output("energy_sent"),
+            law: b
+                .doc(
+                    "`position`: spring and damper as they are; with delay they need damping_abs. `tank`: passive whatever the delay, \
+                     by a tank of energy at each end; of use where both robots have it.",
+                )
+                .tunable(Tunable::Unconfigured)
+                .property("law", "position".to_owned()),
             stiffness: b.doc("Spring.").unit("N/m").range(0.0..=1000.0).property("stiffness", p.stiffness),
             damping_rel: b
                 .doc("Damper on the difference of velocities.")
@@ -104,7 +122,7 @@ impl Component for CartImpedance {
                 .unit("m")
                 .range(-100.0..=100.0)
                 .property("offset", p.offset),
-            law: Impedance::default(),
+            coupling: Impedance::default(),
             recent: Recent::default(),
         }
     }
@@ -112,7 +130,8 @@ impl Component for CartImpedance {
     #[allow(clippy::cast_precision_loss)]
     fn update(&mut self, cx: &mut Context) {
         let (Some(pose), Some(twist)) = (self.tool_pose.get(), self.tool_twist.get()) else { return };
-        self.law.parameters = ImpedanceParameters {
+        self.coupling.parameters = ImpedanceParameters {
+            law: CouplingLaw::named(self.law.get_ref()).unwrap_or_default(),
             stiffness: self.stiffness.get(),
             damping_rel: self.damping_rel.get(),
             damping_abs: self.damping_abs.get(),
@@ -125,11 +144,14 @@ impl Component for CartImpedance {
             position: r.p.into(),
             velocity: r.v.into(),
             age: (stamp(cx.now()) - r.stamp) as f64 * 1e-9,
+            coupled: r.coupled,
+            energy: r.energy,
         });
         let coupled = self.ext_ref_mode.get().unwrap_or(false);
-        let out = self.law.update(&pose.p.into(), &twist.v.into(), reference.as_ref(), coupled, cx.dt());
+        let out = self.coupling.update(&pose.p.into(), &twist.v.into(), reference.as_ref(), coupled, cx.dt());
         self.f_des.write(out.force);
         self.engaged.write(out.engaged);
+        self.energy_sent.write(self.coupling.energy_sent());
         if let Some(reference) = reference {
             self.f_raw_norm.write(out.raw_norm);
             self.f_jump.write(self.recent.rise(cx.now().as_secs_f64(), out.raw_norm));

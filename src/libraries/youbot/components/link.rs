@@ -1,7 +1,7 @@
 //! `youbot.Link_Tx` and `youbot.Link_Rx`: the two ends of the link to the other robot.
 
 use super::samples::{ExtRef, ToolPose, ToolTwist, stamp};
-use crate::libraries::youbot::link::{LinkReceiver, LinkStats, Packet, PeerState, RESTART_SHOWN};
+use crate::libraries::youbot::link::{Echo, LinkReceiver, LinkStats, Packet, PeerState, RESTART_SHOWN};
 use crate::runtime::{Builder, Component, Context, In, OperationAnswer, Out, Prop};
 
 /// Sends where the tool is.
@@ -10,6 +10,9 @@ pub struct LinkTx {
     tool_twist: In<ToolTwist>,
     aligned: In<bool>,
     copying: In<bool>,
+    yields: In<bool>,
+    energy: In<f64>,
+    echo: In<Echo>,
     tx: Out<Packet>,
     peer_addr: Prop<String>,
     period: Prop<f64>,
@@ -34,7 +37,12 @@ impl Component for LinkTx {
             tool_pose: b.doc("Where the tool is.").input("tool_pose"),
             tool_twist: b.doc("How it moves.").input("tool_twist"),
             aligned: b.doc("Whether our wanted force is small.").input("aligned"),
-            copying: b.doc("Whether our coupling is engaged.").input("copying"),
+            copying: b.doc("Whether we want to be coupled.").input("copying"),
+            yields: b.doc("Whether our base yields.").input("yields"),
+            energy: b.doc("Energy our coupling has given to the other one so far.").unit("J").input("energy"),
+            echo: b
+                .doc("What Link_Rx heard last; without it the other robot cannot tell its clock from ours, and has no link.")
+                .input("echo"),
             tx: b.doc("Packets, for a buffered connection.").output("tx"),
             peer_addr: b.doc("Where the other robot is.").property("peer_addr", "sim:peer".to_owned()),
             period: b.doc("Between two packets.").unit("s").range(0.001..=0.1).property("period", 0.004),
@@ -57,10 +65,13 @@ impl Component for LinkTx {
             epoch: self.epoch.get(),
             seq: self.seq,
             stamp: stamp(cx.now()),
+            echo: self.echo.get().unwrap_or_default(),
             p: pose.p,
             v: twist.v,
             aligned: self.aligned.get().unwrap_or(false),
             copying: self.copying.get().unwrap_or(false),
+            yields: self.yields.get().unwrap_or(false),
+            energy: self.energy.get().unwrap_or(0.0),
         });
     }
 }
@@ -71,6 +82,7 @@ pub struct LinkRx {
     ext_ref: Out<ExtRef>,
     link_stats: Out<LinkStats>,
     peer_state: Out<PeerState>,
+    echo: Out<Echo>,
     max_seq_gap: Prop<i64>,
     window: Prop<f64>,
     receiver: LinkReceiver,
@@ -80,7 +92,10 @@ pub struct LinkRx {
 
 impl Component for LinkRx {
     fn new(b: &mut Builder<Self>) -> Self {
-        b.describe("Receives the other robot's packets: the newest counts; age, gaps, jitter and loss are measured.")
+        b.describe(
+            "Receives the other robot's packets: the newest counts; age, gaps, jitter and loss are measured, and how the two clocks \
+             differ. Before a packet went round there and back there is no reference and no link.",
+        )
             .start_after("youbot.Link_Tx")
             .on_start(|c, _| {
                 c.receiver.reset();
@@ -93,9 +108,10 @@ impl Component for LinkRx {
         });
         Self {
             rx: b.doc("Packets.").buffered().required().input("rx"),
-            ext_ref: b.doc("Where the other tool was.").output("ext_ref"),
+            ext_ref: b.doc("Where the other tool was, in moments of this robot's clock.").output("ext_ref"),
             link_stats: b.doc("How good the link is.").output("link_stats"),
             peer_state: b.doc("What the other robot says of itself.").output("peer_state"),
+            echo: b.doc("What was heard last, for Link_Tx to send back.").output("echo"),
             max_seq_gap: b
                 .doc("A packet so far behind means that the sender began anew.")
                 .range(1.0..=10_000.0)
@@ -117,12 +133,18 @@ impl Component for LinkRx {
             news = true;
         }
         if news && let Some(p) = self.receiver.newest() {
-            self.ext_ref.write(ExtRef { p: p.p, v: p.v, stamp: p.stamp });
+            if let Some(sent) = self.receiver.sent() {
+                #[allow(clippy::cast_possible_truncation)]
+                let sent = (sent * 1e9) as i64;
+                self.ext_ref.write(ExtRef { p: p.p, v: p.v, stamp: sent, coupled: p.copying, energy: p.energy });
+            }
+            self.echo.write(self.receiver.echo());
             if self.epoch.replace(p.epoch).is_some_and(|before| before != p.epoch) {
                 self.restarted = now;
             }
             let restarted = now - self.restarted < RESTART_SHOWN;
-            self.peer_state.write(PeerState { epoch: p.epoch, aligned: p.aligned, copying: p.copying, restarted });
+            let Packet { epoch, aligned, copying, yields, .. } = *p;
+            self.peer_state.write(PeerState { epoch, aligned, copying, yields, restarted });
         }
         if let Some(stats) = self.receiver.stats(now) {
             self.link_stats.write(stats);

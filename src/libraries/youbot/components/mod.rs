@@ -6,10 +6,13 @@ mod dynamics;
 mod impedance;
 mod kinematics;
 mod link;
+mod net;
 mod operator;
+mod passivity;
 mod peer;
 mod reporter;
 pub mod samples;
+mod world;
 
 pub use base_ctrl::BaseCtrl;
 pub use driver::Driver;
@@ -17,9 +20,12 @@ pub use dynamics::DynamicsComponent;
 pub use impedance::CartImpedance;
 pub use kinematics::ArmKinematics;
 pub use link::{LinkRx, LinkTx};
+pub use net::Net;
 pub use operator::{ModeSwitch, Operator};
+pub use passivity::CouplingObserver;
 pub use peer::Peer;
 pub use reporter::Reporter;
+pub use world::YoubotWorld;
 
 use crate::runtime::{Context, In, Library, PortValue};
 use samples::seconds_since;
@@ -27,6 +33,7 @@ use samples::seconds_since;
 /// The library `youbot`.
 pub fn library() -> Library {
     Library::new("youbot")
+        .with::<YoubotWorld>("youbot.World")
         .with::<Driver>("youbot.Driver")
         .with::<ArmKinematics>("youbot.Arm_Kinematics")
         .with::<CartImpedance>("youbot.Cart_Impedance")
@@ -34,7 +41,9 @@ pub fn library() -> Library {
         .with::<BaseCtrl>("youbot.Base_Ctrl")
         .with::<LinkTx>("youbot.Link_Tx")
         .with::<LinkRx>("youbot.Link_Rx")
+        .with::<Net>("youbot.Net")
         .with::<Peer>("youbot.Peer")
+        .with::<CouplingObserver>("youbot.Passivity_Observer")
         .with::<Operator>("youbot.Operator")
         .with::<ModeSwitch>("youbot.Mode_Switch")
         .with::<Reporter>("youbot.Reporter")

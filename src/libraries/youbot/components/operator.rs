@@ -38,8 +38,10 @@ impl Component for Operator {
             }
         });
         Self {
-            tool_pose: b.doc("Where the tool is.").input("tool_pose"),
-            tool_twist: b.doc("How it moves.").input("tool_twist"),
+            tool_pose: b
+                .doc("Where the tool truly is: a hand feels the arm, not what a controller makes of it.")
+                .input("tool_pose"),
+            tool_twist: b.doc("How it truly moves.").input("tool_twist"),
             ext_ref: b.doc("Where the other tool is.").input("ext_ref"),
             control_mode: b
                 .doc("What the drives do: a hand does not hold an arm that moves by itself. Not connected: 6.")

@@ -1,9 +1,11 @@
 //! `youbot.Peer`: a stand-in for the other robot and for the network between the two.
 
+use super::net::{NetworkProperties, seen_by};
 use super::samples::{ToolPose, stamp};
 use crate::libraries::youbot::hand::{Hand, HandScript};
+use crate::libraries::youbot::impedance::CouplingLaw;
 use crate::libraries::youbot::impedance::Reference;
-use crate::libraries::youbot::link::Packet;
+use crate::libraries::youbot::link::{LinkReceiver, Packet};
 use crate::libraries::youbot::network::{Network, Quality};
 use crate::libraries::youbot::rigid_body::{J5, radians};
 use crate::libraries::youbot::robot::{CONTROL_PERIOD, Robot};
@@ -29,13 +31,10 @@ pub struct Peer {
     stiffness: Prop<f64>,
     damping_rel: Prop<f64>,
     damping_abs: Prop<f64>,
+    law: Prop<String>,
     force_gain: Prop<Vector3<f64>>,
-    delay: Prop<f64>,
-    jitter: Prop<f64>,
-    loss: Prop<f64>,
-    cut: Prop<bool>,
+    network: NetworkProperties,
     jump: Prop<Vector3<f64>>,
-    seed: Prop<i64>,
     world: Box<PeerWorld>,
     epoch: i64,
 }
@@ -57,7 +56,7 @@ struct PeerWorld {
     hand: Hand,
     to_peer: Network<Packet>,
     from_peer: Network<Packet>,
-    heard: Option<Packet>,
+    receiver: LinkReceiver,
     aligned: HeldPeer,
     since: f64,
     seq: i64,
@@ -70,33 +69,34 @@ impl PeerWorld {
             hand: Hand::new(script),
             to_peer: Network::new(Quality::default(), seed),
             from_peer: Network::new(Quality::default(), seed ^ 0x5555_5555),
-            heard: None,
+            receiver: LinkReceiver::default(),
             aligned: HeldPeer::default(),
             since: f64::INFINITY,
             seq: 0,
         }
     }
 
-    /// One control period of the other robot, ending at `now` (s).
-    #[allow(clippy::cast_precision_loss)]
-    fn step(&mut self, now: f64) -> (bool, bool) {
+    /// One control period of the other robot, ending at `now` (s): whether it is aligned, and whether it wants to be coupled.
+    fn step(&mut self, now: f64, ahead: i64) -> (bool, bool) {
         while let Some(packet) = self.to_peer.receive(now) {
-            if self.heard.is_none_or(|h| (h.epoch, h.seq) < (packet.epoch, packet.seq)) {
-                self.heard = Some(packet);
-            }
+            // The other robot's clock is ahead of this one's by so much, and it thinks in its own.
+            self.receiver.take(seen_by(packet, ahead), now);
         }
-        let reference = self.heard.map(|h| Reference {
-            position: h.p.into(),
-            velocity: h.v.into(),
-            age: now - h.stamp as f64 * 1e-9,
+        let heard = self.receiver.newest().copied().unwrap_or_default();
+        let reference = self.receiver.sent().map(|sent| Reference {
+            position: heard.p.into(),
+            velocity: heard.v.into(),
+            age: now - sent,
+            coupled: heard.copying,
+            energy: heard.energy,
         });
         let fresh = reference.is_some_and(|r| r.age < 0.1);
-        // It follows: engaged while it hears that we are.
-        let copying = fresh && self.heard.is_some_and(|h| h.copying);
+        // It follows: it wants to be coupled while it hears that we do.
+        let copying = fresh && heard.copying;
         let tool = self.robot.tool;
         let push =
             self.hand.update(&tool.position, &tool.velocity, reference.as_ref().map(|r| &r.position), CONTROL_PERIOD);
-        self.robot.step(reference.as_ref(), copying, &push);
+        self.robot.step(reference.as_ref(), copying, heard.yields, &push);
         let low = fresh && self.robot.raw_norm < ALIGNED_FORCE;
         (self.aligned.update(low, ALIGNED_TIME, CONTROL_PERIOD), copying)
     }
@@ -106,12 +106,12 @@ impl Component for Peer {
     fn new(b: &mut Builder<Self>) -> Self {
         b.describe(
             "The other robot, simulated whole (plant, coupling, dynamics, hand), behind a network that delays, jitters, \
-             loses and can be cut. It engages while it hears that this robot is engaged.",
+             loses and can be cut, both ways alike. It couples while it hears that this robot wants to be coupled.",
         )
         .on_configure(|c, _| {
             let script = c.read_script()?;
-            *c.world = PeerWorld::new(c.q_start.get(), script, c.seed.get().unsigned_abs());
-            Ok(())
+            *c.world = PeerWorld::new(c.q_start.get(), script, c.network.seed());
+            c.law()
         });
         b.doc("The other robot begins anew: another epoch.").no_effect().operation("restart", |c, _, (): ()| {
             c.epoch += 1;
@@ -146,20 +146,16 @@ impl Component for Peer {
                 .doc("How its base gives way, as of Dynamics.")
                 .range(0.0..=1.0)
                 .property("force_gain", Vector3::zeros()),
-            delay: b.doc("One way.").unit("s").range(0.0..=1.0).property("delay", 0.002),
-            jitter: b
-                .doc("Added to the delay, evenly spread up to this.")
-                .unit("s")
-                .range(0.0..=1.0)
-                .property("jitter", 0.0),
-            loss: b.doc("Share of packets lost.").range(0.0..=1.0).property("loss", 0.0),
-            cut: b.doc("Nothing gets through.").property("cut", false),
+            law: b
+                .doc("Of its coupling, as of Cart_Impedance.")
+                .tunable(Tunable::Unconfigured)
+                .property("law", "position".to_owned()),
+            network: NetworkProperties::declare(b),
             jump: b
                 .doc("Added to the positions the other robot sends: a corrupt sensor.")
                 .unit("m")
                 .range(-10.0..=10.0)
                 .property("jump", Vector3::zeros()),
-            seed: b.doc("Of the network's luck.").tunable(Tunable::Unconfigured).property("seed", 1_i64),
             world: Box::new(PeerWorld::new(radians(START_DEG), HandScript::default(), 1)),
             epoch: 1,
         }
@@ -173,8 +169,7 @@ impl Component for Peer {
             }
         }
         let now = cx.now().as_secs_f64();
-        let quality =
-            Quality { delay: self.delay.get(), jitter: self.jitter.get(), loss: self.loss.get(), cut: self.cut.get() };
+        let (quality, ahead) = (self.network.quality(), self.network.clock_difference(now));
         let w = &mut *self.world;
         w.to_peer.quality = quality;
         w.from_peer.quality = quality;
@@ -189,7 +184,7 @@ impl Component for Peer {
         let mut state = (false, false);
         let steps = (cx.dt() / CONTROL_PERIOD).round().max(1.0) as u32;
         for i in 0..steps {
-            state = w.step(now - f64::from(steps - 1 - i) * CONTROL_PERIOD);
+            state = w.step(now - f64::from(steps - 1 - i) * CONTROL_PERIOD, -ahead);
         }
         let tool = &w.robot.tool;
         w.since += cx.dt();
@@ -200,21 +195,31 @@ impl Component for Peer {
                 epoch: self.epoch,
                 seq: w.seq,
                 stamp: stamp(cx.now()),
+                echo: w.receiver.echo(),
                 p: (tool.position + self.jump.get()).into(),
                 v: tool.velocity.into(),
                 aligned: state.0,
                 copying: state.1,
+                yields: w.robot.dynamics.parameters.yields(),
+                energy: w.robot.impedance.energy_sent(),
             };
             w.from_peer.send(now, packet);
         }
         while let Some(packet) = w.from_peer.receive(now) {
-            self.tx.write(packet);
+            self.tx.write(seen_by(packet, ahead));
         }
         self.tool_pose.write(ToolPose { p: tool.position.into(), q: tool.orientation.coords.into() });
     }
 }
 
 impl Peer {
+    fn law(&mut self) -> Result<(), Failure> {
+        let name = self.law.get_ref();
+        let law = CouplingLaw::named(name).ok_or_else(|| Failure(format!("no law `{name}`: position or tank")))?;
+        self.world.robot.impedance.parameters.law = law;
+        Ok(())
+    }
+
     fn read_script(&mut self) -> Result<HandScript, Failure> {
         self.script.get_ref().parse::<HandScript>().map_err(|e| Failure::from_error(&e))
     }

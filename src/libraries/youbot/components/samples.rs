@@ -1,6 +1,7 @@
 //! What travels through the ports.
 
 use crate::libraries::youbot::base::{Pose2, Twist2};
+use crate::libraries::youbot::rigid_body::J5;
 use crate::time::Time;
 
 crate::runtime::record! {
@@ -43,6 +44,30 @@ crate::runtime::record! {
         pub vy: f64,
         /// Turning left, rad/s.
         pub wz: f64,
+    }
+
+    /// What a driver does to arm and base.
+    #[derive(Copy, Default)]
+    pub struct PlantCommand {
+        /// Torques, N m.
+        pub torque: [f64; 5],
+        /// The windings are shorted, and no torque is given.
+        pub braked: bool,
+        /// Where the base is to go.
+        pub twist: Twist,
+    }
+
+    /// Where arm and base are.
+    #[derive(Copy, Default)]
+    pub struct PlantState {
+        /// Angles from candle, rad.
+        pub pos: [f64; 5],
+        /// Speeds, rad/s.
+        pub vel: [f64; 5],
+        /// The base.
+        pub base: Odometry,
+        /// When, ns of the clock.
+        pub stamp: i64,
     }
 
     /// How the motors are.
@@ -90,8 +115,12 @@ crate::runtime::record! {
         pub p: [f64; 3],
         /// In m/s.
         pub v: [f64; 3],
-        /// When it was so, ns of the clock.
+        /// When it was so, ns of this robot's clock.
         pub stamp: i64,
+        /// The other robot wants to be coupled.
+        pub coupled: bool,
+        /// Energy its coupling has given to this one's so far, J.
+        pub energy: f64,
     }
 }
 
@@ -116,6 +145,13 @@ impl Odometry {
     /// Position and motion.
     pub fn split(&self) -> (Pose2, Twist2) {
         (Pose2 { x: self.x, y: self.y, th: self.th }, Twist2 { vx: self.vx, vy: self.vy, wz: self.wz })
+    }
+}
+
+impl PlantState {
+    /// From the parts.
+    pub fn new(q: J5, qd: J5, pose: Pose2, twist: Twist2, stamp: i64) -> Self {
+        Self { pos: q.into(), vel: qd.into(), base: Odometry::new(pose, twist), stamp }
     }
 }
 

@@ -1,0 +1,153 @@
+//! What there is of a robot when its software is taken away: arm and base, and what the tool touches.
+
+use super::base::Twist2;
+use super::kinematics::Tool;
+use super::parameters::GRIPPER;
+use super::plant::{ArmPlant, BasePlant, base_rotation};
+use super::rigid_body::{ArmModel, J5};
+use nalgebra::Vector3;
+
+/// Integration step, in s.
+pub const PLANT_STEP: f64 = 0.0005;
+/// Steps taken at once at most: a world that is called late loses time, it does not make up for it.
+const STEPS_AT_ONCE: f64 = 100.0;
+
+/// A table and a wall, which the tool point touches without friction.
+#[derive(Debug, Clone, Copy)]
+pub struct Surroundings {
+    /// Height of the table, in m.
+    pub table: f64,
+    /// Where the wall stands, across the world's x axis, in m; it is behind that.
+    pub wall: f64,
+    /// Of both, in N/m.
+    pub stiffness: f64,
+    /// Of both, in N s/m.
+    pub damping: f64,
+}
+
+/// Where nothing is touched: out of reach.
+pub const FAR: f64 = 100.0;
+
+impl Default for Surroundings {
+    fn default() -> Self {
+        Self { table: -FAR, wall: FAR, stiffness: 10_000.0, damping: 100.0 }
+    }
+}
+
+impl Surroundings {
+    /// How far a tool is inside of the table and of the wall, in m; not positive: it does not touch it.
+    pub fn penetration(&self, position: &Vector3<f64>) -> [f64; 2] {
+        [self.table - position.z, position.x - self.wall]
+    }
+
+    /// What they do to a tool, in N.
+    pub fn force(&self, position: &Vector3<f64>, velocity: &Vector3<f64>) -> Vector3<f64> {
+        let inside = self.penetration(position);
+        let press = |inside: f64, speed: f64| match inside > 0.0 {
+            // Nothing sticks.
+            true => (self.stiffness * inside + self.damping * speed).max(0.0),
+            false => 0.0,
+        };
+        Vector3::new(-press(inside[1], velocity.x), 0.0, press(inside[0], -velocity.z))
+    }
+}
+
+/// A robot's body, and what its tool touches.
+#[derive(Debug, Clone)]
+pub struct RobotBody {
+    /// The arm.
+    pub arm: ArmPlant,
+    /// The base.
+    pub base: BasePlant,
+    /// What the tool may touch.
+    pub surroundings: Surroundings,
+    /// What it does to the tool, in N.
+    pub contact: Vector3<f64>,
+    /// Time constant with which the motors' torques follow what is wanted, in s; 0: at once.
+    pub torque_lag: f64,
+    /// What the motors give now, in N m.
+    given: J5,
+}
+
+impl RobotBody {
+    /// At rest with its joints at `q`; masses as multiples of the nominal ones.
+    pub fn new(q: J5, mass_scale: f64) -> Self {
+        Self {
+            arm: ArmPlant::new(ArmModel::youbot(GRIPPER.mass, mass_scale), q),
+            base: BasePlant::default(),
+            surroundings: Surroundings::default(),
+            contact: Vector3::zeros(),
+            torque_lag: 0.0,
+            given: J5::zeros(),
+        }
+    }
+
+    /// Where the tool is in the world, and how it moves.
+    pub fn tool(&self) -> Tool {
+        Tool::of(&self.arm.model, &self.arm.q, &self.arm.qd, self.base.pose, self.base.twist)
+    }
+
+    /// Moves on by `dt` seconds, in steps of [`PLANT_STEP`]. `push` is a hand's force on the tool in the world, `braked`: the
+    /// windings are shorted.
+    pub fn advance(&mut self, torque: &J5, twist: Twist2, push: &Vector3<f64>, braked: bool, dt: f64) {
+        let steps = (dt / PLANT_STEP).round().clamp(1.0, STEPS_AT_ONCE);
+        let step = (dt / steps).min(2.0 * PLANT_STEP);
+        let mut done = 0.0;
+        while done < steps {
+            let tool = self.tool();
+            self.contact = self.surroundings.force(&tool.position, &tool.velocity);
+            let force = base_rotation(self.base.pose).inverse() * (push + self.contact);
+            let motion = self.base.step(twist, step);
+            // Shorted windings have no torque of the drives' to follow.
+            let follows = if braked || self.torque_lag <= 0.0 { 1.0 } else { 1.0 - (-step / self.torque_lag).exp() };
+            self.given += (torque - self.given) * follows;
+            self.arm.step(&self.given, &force, &motion, braked, step);
+            done += 1.0;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::parameters::WORKING_POSE_DEG;
+    use super::super::rigid_body::radians;
+    use super::*;
+
+    #[test]
+    fn a_wall_holds_a_pushed_tool_and_lets_it_go() {
+        let mut body = RobotBody::new(radians(WORKING_POSE_DEG), 1.0);
+        body.surroundings.wall = body.tool().position.x + 0.01;
+        let pushed = |body: &mut RobotBody, push: f64| {
+            for _ in 0..2000 {
+                let torque = body.arm.model.gravity(&body.arm.posture());
+                body.advance(&torque, Twist2::default(), &Vector3::new(push, 0.0, 0.0), false, PLANT_STEP);
+            }
+            body.surroundings.penetration(&body.tool().position)[1]
+        };
+        let inside = pushed(&mut body, 30.0);
+        // Friction carries part of it, for the push or against it.
+        assert!(
+            inside > 0.002 && inside < 0.004 && (-40.0..-20.0).contains(&body.contact.x),
+            "{inside} {}",
+            body.contact
+        );
+        assert!(pushed(&mut body, -30.0) < -0.01 && body.contact == Vector3::zeros());
+    }
+
+    #[test]
+    fn torques_follow_with_a_lag() {
+        let mut body = RobotBody::new(radians(WORKING_POSE_DEG), 1.0);
+        body.torque_lag = 0.002;
+        body.advance(&J5::repeat(1.0), Twist2::default(), &Vector3::zeros(), false, 0.002);
+        assert!((body.given[0] - (1.0 - (-1.0_f64).exp())).abs() < 1e-12, "{}", body.given);
+    }
+
+    #[test]
+    fn nothing_is_touched_that_is_not_there() {
+        let nothing = Surroundings::default();
+        assert_eq!(nothing.force(&Vector3::new(0.5, 0.0, -0.1), &Vector3::zeros()), Vector3::zeros());
+        let table = Surroundings { table: 0.1, ..nothing };
+        assert_eq!(table.force(&Vector3::new(0.5, 0.0, 0.099), &Vector3::zeros()).z.round(), 10.0);
+        assert_eq!(table.force(&Vector3::new(0.5, 0.0, 0.099), &Vector3::new(0.0, 0.0, 1.0)).z, 0.0);
+    }
+}
