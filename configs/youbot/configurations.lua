@@ -4,7 +4,7 @@
 -- The four configurations of the coupling's switch are in coupling.lua.
 
 -- `stand_in`: a stand-in for the other robot is part of the deployment (deployments/youbot_arm.yaml). In the coupling of two robots there
--- is none (deployments/youbot_robot.yaml): what the link sends and hears is exported.
+-- is none (deployments/youbot_robot.yaml): what the link sends and hears is exported. `hand`: what the operator's hand does.
 
 local function with_stand_in(changes, more)
   if stand_in then
@@ -94,7 +94,7 @@ ConfiguratorConf {
     property_set("Cart_Impedance.stiffness",     150.0),
     property_set("Cart_Impedance.damping_abs",   5.0),
     property_set("Cart_Impedance.offset",        { 0.0, 0.0, 0.0 }),
-    property_set("Operator.script",              "free 0.5; align 8; hold 1; sway 600 0.06 0 0 0.15"),
+    property_set("Operator.script",              stand_in and "free 0.5; align 8; hold 1; sway 600 0.06 0 0 0.15" or hand),
     post_conf_state = { "_default:configured" },
   }, function() return {
     property_set("Peer.delay",                   0.005),
