@@ -90,22 +90,19 @@ fn pair(frames: &[Arc<Frame>], requester: Requester, busy: &[FrameId]) -> Option
     let clear = |lower: usize, upper: usize| {
         frames[lower + 1..upper].iter().all(|between| !share::shares(&frames[upper], between))
     };
-    let pairs: Vec<(usize, usize)> = own
-        .windows(2)
-        .map(|two| (two[0], two[1]))
-        .filter(|(a, b)| free(&frames[*a]) && free(&frames[*b]) && clear(*a, *b))
-        .collect();
+    let pairs = own.windows(2).map(|two| (two[0], two[1])).filter(|(a, b)| free(&frames[*a]) && free(&frames[*b]));
+    // What lies between is looked at last: that takes longest.
+    let first = |fits: &dyn Fn(usize, usize) -> bool| pairs.clone().find(|(a, b)| fits(*a, *b) && clear(*a, *b));
     // The newest frame stays by itself as long as there is any other way: it is the one most likely to be undone.
-    let older = || pairs.iter().copied().filter(|(_, upper)| Some(*upper) != newest);
+    let older = |upper: usize| Some(upper) != newest;
     let (floor, group) = (|at: usize| frames[at].floor.is_some(), |at: usize| frames[at].group.is_some());
     // Below a floor nothing can be undone anyway.
-    older()
-        .find(|(_, upper)| floor(*upper))
+    first(&|_, b| older(b) && floor(b))
         // A group's frame is wanted when the group changes.
-        .or_else(|| older().find(|(a, b)| !floor(*a) && !group(*a) && !group(*b)))
-        .or_else(|| older().find(|(a, _)| !floor(*a)))
-        .or_else(|| older().next())
-        .or_else(|| pairs.first().copied())
+        .or_else(|| first(&|a, b| older(b) && !floor(a) && !group(a) && !group(b)))
+        .or_else(|| first(&|a, b| older(b) && !floor(a)))
+        .or_else(|| first(&|_, b| older(b)))
+        .or_else(|| first(&|_, _| true))
 }
 
 /// The list that takes a frame back.
@@ -125,7 +122,7 @@ pub(super) fn squash(lower: &Frame, upper: &Frame) -> Frame {
         }
     }
     let mut seen: FxHashSet<(Slot, u8, Option<Slot>)> = FxHashSet::default();
-    let touches: Vec<Touch> = lower
+    let mut touches: Vec<Touch> = lower
         .footprint
         .touches
         .iter()
@@ -133,6 +130,8 @@ pub(super) fn squash(lower: &Frame, upper: &Frame) -> Frame {
         .filter(|t| seen.insert((t.slot, t.access as u8, t.serves)))
         .copied()
         .collect();
+    // Such frames are kept for long, and by whoever follows thousands of stacks in great number.
+    touches.shrink_to_fit();
     let mut slots: FxHashSet<Slot> = FxHashSet::default();
     let saved = lower.saved.iter().chain(&upper.saved).filter(|s| slots.insert(s.slot)).cloned().collect();
     let mut floor = lower.floor.clone().or_else(|| upper.floor.clone());
@@ -155,6 +154,7 @@ pub(super) fn squash(lower: &Frame, upper: &Frame) -> Frame {
             ));
             inverse = Vec::new();
         }
+        inverse.shrink_to_fit();
     }
     Frame {
         id: upper.id,

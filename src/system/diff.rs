@@ -179,7 +179,7 @@ fn changed_ports(node: &ComponentNode, target: &ComponentNode) -> Vec<(MemberRef
 fn data_flow(system: &System) -> Vec<&ComponentNode> {
     let mut components: Vec<Vec<&ComponentNode>> = petgraph::algo::kosaraju_scc(system.graph())
         .into_iter()
-        .map(|scc| scc.into_iter().map(|i| &system.graph()[i]).collect())
+        .map(|scc| scc.into_iter().map(|i| &*system.graph()[i]).collect())
         .collect();
     // Kosaraju gives consumers first.
     components.reverse();

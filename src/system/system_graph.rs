@@ -22,7 +22,8 @@ pub struct System {
 /// What is there.
 #[derive(Debug, Clone, Default)]
 struct There {
-    graph: StableDiGraph<ComponentNode, Link>,
+    /// Each component by itself is shared as well.
+    graph: StableDiGraph<Arc<ComponentNode>, Link>,
     names: FxHashMap<ComponentName, NodeIndex>,
     links: FxHashMap<(MemberRef, MemberRef), EdgeIndex>,
     driven: FxHashMap<MemberRef, Driven>,
@@ -235,7 +236,7 @@ impl System {
     }
 
     /// The graph: components, and connections from the out-port's component to the in-port's.
-    pub fn graph(&self) -> &StableDiGraph<ComponentNode, Link> {
+    pub fn graph(&self) -> &StableDiGraph<Arc<ComponentNode>, Link> {
         &self.there.graph
     }
 
@@ -255,7 +256,7 @@ impl System {
 
     /// The component behind a handle.
     pub fn node_at(&self, index: NodeIndex) -> Option<&ComponentNode> {
-        self.there.graph.node_weight(index)
+        self.there.graph.node_weight(index).map(AsRef::as_ref)
     }
 
     fn change(&mut self) -> &mut There {
@@ -270,7 +271,7 @@ impl System {
 
     pub(super) fn touch_at(&mut self, index: NodeIndex) -> Option<&mut ComponentNode> {
         self.revision += 1;
-        let node = Arc::make_mut(&mut self.there).graph.node_weight_mut(index)?;
+        let node = Arc::make_mut(&mut self.there).graph.node_weight_mut(index).map(Arc::make_mut)?;
         node.generation = self.revision;
         Some(node)
     }
@@ -286,7 +287,7 @@ impl View for System {
     }
 
     fn component(&self, name: ComponentName) -> Option<&ComponentNode> {
-        self.there.names.get(&name).map(|i| &self.there.graph[*i])
+        self.there.names.get(&name).map(|i| &*self.there.graph[*i])
     }
 
     fn link(&self, from: MemberRef, to: MemberRef) -> Option<Policy> {
@@ -298,7 +299,7 @@ impl View for System {
     }
 
     fn for_each_component(&self, f: &mut dyn FnMut(&ComponentNode)) {
-        self.there.graph.node_weights().for_each(f);
+        self.there.graph.node_weights().for_each(|node| f(node));
     }
 
     fn for_each_link(&self, f: &mut dyn FnMut(MemberRef, MemberRef, Policy)) {
@@ -316,7 +317,7 @@ impl ViewMut for System {
         node.born = self.revision;
         node.generation = self.revision;
         let name = node.name;
-        let index = self.change().graph.add_node(node);
+        let index = self.change().graph.add_node(Arc::new(node));
         self.change().names.insert(name, index);
     }
 
