@@ -1,14 +1,16 @@
 //! What coordinators hand on: requests come to the desk, emitted names to the others' inboxes.
 
-use super::product::Product;
-use super::reactions::{Handed, Macrostep};
+use super::desks::{AnsweredPlaces, Coming, is_left};
+use super::product::{Product, as_begun};
+use super::reactions::Macrostep;
 use super::shared_list::SharedList;
 use super::state::{Answers, Failed, Interrupted, Move, Next, Nexts, ProductState, States, bit, index, one};
 use crate::limits;
-use crate::model::{Ask, ConfigId, EventName, Findings, RequestId, Verdict, codes};
-use crate::stack::{ActiveBatch, Arrival, Arrived, Batch, Request, Requester, Why, given_up_of};
+use crate::model::{Ask, ConfigId, EventName, Findings, Verdict, codes};
+use crate::stack::{ActiveBatch, Arrived, Batch, Request, Requester, Why, given_up_of};
 use crate::statechart::{EventId, NodeId};
 use smallvec::SmallVec;
+use std::rc::Rc;
 
 /// Whether a push is refused because the stack is full.
 fn is_for_room(why: &Findings) -> bool {
@@ -32,17 +34,10 @@ impl Product<'_> {
         state.leaves[by] = reaction.leaf;
         self.forget(&mut state, by, &reaction.left);
         let mut states = one(state);
-        let requester = self.members[by].by;
         // A coordinator that does not come to rest asks without end, and each time may come before or after what ends.
         self.forked |= reaction.handed.len() > limits::CHECK_HANDED;
-        for handed in reaction.handed.iter().take(limits::CHECK_HANDED) {
-            let batch = match handed {
-                Handed::Batch(asked) => asked.iter().map(|asked| Self::request(requester, asked)).collect(),
-                Handed::Down => {
-                    Batch::one(Request { why: Why::Down, ..Request::new(RequestId(0), Ask::Undo, requester) })
-                }
-            };
-            states = self.all_arrive(states, &batch);
+        for batch in reaction.handed.iter().take(limits::CHECK_HANDED) {
+            states = self.all_arrive(states, batch);
             self.forked |= states.len() > limits::CHECK_FORKS;
             states.truncate(limits::CHECK_FORKS);
         }
@@ -62,72 +57,49 @@ impl Product<'_> {
             return;
         }
         let requester = self.members[by].by;
-        let gone = |request: &mut Request| {
-            let owner = request.tag.0.checked_sub(1);
-            if request.requester == requester && left.iter().any(|node| Some(node.index() as u64) == owner) {
-                request.tag = (0, 0);
-            }
-        };
+        let gone = |request: &Request| is_left(request, requester, left);
         if !state.desk.is_empty() {
-            state.desk.requests_mut().for_each(gone);
+            self.desks.leave(&mut state.desk, requester, left);
         }
-        state.safe.iter_mut().for_each(gone);
-        state.due.iter_mut().for_each(|(request, _)| gone(request));
+        state.safe.update(gone, |request| request.tag = (0, 0));
+        state.due.update(|(request, _)| gone(request), |(request, _)| request.tag = (0, 0));
         state.due.retain(|(request, _)| self.tells_all || is_for_somebody(request));
-        state.telling.iter_mut().for_each(|(request, _)| gone(request));
+        state.telling.update(|(request, _)| gone(request), |(request, _)| request.tag = (0, 0));
         if self.tells_all && self.members.len() > 1 {
             state.telling.retain(|(request, _)| is_for_somebody(request));
         }
-        state.in_transit.iter_mut().flat_map(|batch| &mut batch.requests).for_each(gone);
+        let requests = state.in_transit.iter_mut().flat_map(|batch| &mut batch.requests);
+        requests.filter(|request| gone(request)).for_each(|request| request.tag = (0, 0));
     }
 
-    /// The batches under way that `batch` would stop.
-    pub(super) fn stopped_by(&self, state: &ProductState, batch: &Batch) -> SmallVec<[u32; 2]> {
-        if state.desk.is_empty() {
-            return SmallVec::new();
-        }
-        let is_safe = |id: ConfigId| self.worlds.configuration(id).is_some_and(|c| c.safe);
-        let mut trial = state.desk.clone();
-        let Arrival { safe, given_up, .. } = trial.arrive(batch.clone(), is_safe, &self.worlds.claims);
-        let mut stopped: SmallVec<[u32; 2]> = given_up.iter().map(|(number, _)| *number).collect();
-        if !safe.is_empty() {
-            stopped.extend(state.desk.under_way().iter().map(|active| active.number));
-        }
-        stopped.retain(|number| !state.is_stopped(*number));
-        stopped.sort_unstable();
-        stopped.dedup();
-        stopped
+    /// What `batch` does where it comes to the desk.
+    fn arrival(&self, state: &ProductState, batch: &Batch) -> Rc<Coming> {
+        self.desks.coming(&state.desk, batch, |id| self.is_safe(id), &self.worlds.claims)
     }
 
-    /// Whether `batch` would stop, overtake or cancel anything: then it makes a difference when it comes.
-    pub(super) fn meddles(&self, state: &ProductState, batch: &Batch) -> bool {
-        // What comes alone, and first, finds nothing to stop.
-        if state.desk.is_empty() && batch.requests.len() == 1 {
-            return false;
-        }
-        let is_safe = |id: ConfigId| self.is_safe(id);
-        let arrival = state.desk.clone().arrive(batch.clone(), is_safe, &self.worlds.claims);
-        // Also what waits its turn behind others: by then these may be over.
-        let finds = |undo: &Request| {
-            let mut active_batches = state.desk.under_way().iter();
-            active_batches.any(|active| given_up_of(undo, &active.batch.requests).is_some())
-        };
-        // Who stands in the queue as down may be taken up before a safe configuration makes everything wait.
-        let is_down = |batch: &Batch| batch.requests.first().is_some_and(|request| request.why == Why::Down);
-        !arrival.told.is_empty()
-            || !self.stopped_by(state, batch).is_empty()
-            || batch.requests.iter().any(finds)
-            || !arrival.safe.is_empty() && state.desk.waiting().any(is_down)
+    /// Whether what comes would stop, overtake or cancel anything: then it makes a difference when it comes.
+    fn meddles(state: &ProductState, coming: &Coming) -> bool {
+        coming.meddles || coming.stops.iter().any(|number| !state.is_stopped(*number))
     }
 
     /// What is in transit comes now, or later where that makes a difference.
     pub(super) fn lands(&mut self, mut state: ProductState) -> States {
-        let mut states = SmallVec::new();
-        if state.in_transit.first().is_some_and(|batch| self.meddles(&state, batch)) {
-            states.push(state.clone());
+        if state.in_transit.is_empty() {
+            return one(state);
         }
+        let mut states = SmallVec::new();
         let mut in_transit = std::mem::take(&mut state.in_transit).into_iter();
-        let first = in_transit.next().map_or_else(|| state.clone(), |batch| self.take_in(state.clone(), batch));
+        let first = in_transit.next().map_or_else(
+            || state.clone(),
+            |batch| {
+                let coming = self.arrival(&state, &batch);
+                if Self::meddles(&state, &coming) {
+                    let in_transit = std::iter::once(batch.clone()).chain(in_transit.clone()).collect();
+                    states.push(ProductState { in_transit, ..state.clone() });
+                }
+                self.take_in(state.clone(), &batch, &coming)
+            },
+        );
         // What came with it may find that it has not begun.
         let mut landed = one(first);
         for batch in in_transit {
@@ -142,30 +114,30 @@ impl Product<'_> {
     fn all_arrive(&mut self, states: States, batch: &Batch) -> States {
         let mut arrived = States::new();
         for state in states {
-            arrived.extend(self.arrive(state, batch.clone()));
+            arrived.extend(self.arrive(state, batch));
         }
         arrived
     }
 
     /// A batch comes. More than one state: what it would stop may not have begun, or be over already.
-    pub(super) fn arrive(&mut self, mut state: ProductState, batch: Batch) -> States {
+    pub(super) fn arrive(&mut self, mut state: ProductState, batch: &Batch) -> States {
         if !state.in_transit.is_empty() {
-            state.in_transit.push(batch);
+            state.in_transit.push(batch.clone());
             return one(state);
         }
-        let mut stops = self.stopped_by(&state, &batch);
-        // What an undo would wait its turn behind, but overtake where it has not begun.
-        let about = |active: &&ActiveBatch| {
-            batch.requests.iter().any(|undo| given_up_of(undo, &active.batch.requests).is_some())
-        };
-        let behind = state.desk.under_way().iter().filter(about).map(|active| active.number);
-        let behind: SmallVec<[u32; 2]> = behind.filter(|of| !stops.contains(of) && !state.is_stopped(*of)).collect();
-        stops.extend(behind.iter().copied());
+        let coming = self.arrival(&state, batch);
         let mut states = States::new();
-        if self.races && self.meddles(&state, &batch) {
+        if self.races && Self::meddles(&state, &coming) {
             states.push(ProductState { in_transit: SharedList::from_iter([batch.clone()]), ..state.clone() });
+            let mut stops = coming.stops.clone();
+            stops.retain(|number| !state.is_stopped(*number));
+            // What an undo would wait its turn behind, but overtake where it has not begun.
+            let behind = coming.about.iter().copied();
+            let behind: SmallVec<[u32; 2]> =
+                behind.filter(|of| !stops.contains(of) && !state.is_stopped(*of)).collect();
+            stops.extend(behind.iter().copied());
             let is_safe = |r: &Request| matches!(r.ask, Ask::Apply(id) if self.is_safe(id));
-            // Given up alone and once, it is answered the same way at whatever time.
+            // AnsweredPlaces up alone and once, it is answered the same way at whatever time.
             let among = |active: &ActiveBatch| {
                 let gives_up = |request: &&Request| given_up_of(request, &active.batch.requests).is_some();
                 let twice = batch.requests.iter().filter(gives_up).count() > 1;
@@ -184,15 +156,16 @@ impl Product<'_> {
                         let mut waits = state.clone();
                         let those = stops.iter().enumerate().filter(|(at, _)| some & (1 << at.min(&2)) != 0);
                         for (_, number) in those.rev() {
-                            waits.desk.put_back(*number, last);
+                            self.desks.put_back(&mut waits.desk, *number, last);
                             waits.placed.retain(|of| of != number);
                         }
-                        states.push(self.take_in(waits, batch.clone()));
+                        let coming = self.arrival(&waits, batch);
+                        states.push(self.take_in(waits, batch, &coming));
                     }
                 }
             }
         }
-        states.insert(0, self.take_in(state, batch));
+        states.insert(0, self.take_in(state, batch, &coming));
         states
     }
 
@@ -201,48 +174,44 @@ impl Product<'_> {
     }
 
     /// A batch comes to the desk.
-    pub(super) fn take_in(&mut self, mut state: ProductState, batch: Batch) -> ProductState {
+    fn take_in(&mut self, mut state: ProductState, batch: &Batch, coming: &Coming) -> ProductState {
         // To come to *down* twice with nothing asked for in between is to come once.
         let is_down = |batch: &Batch| batch.requests.first().is_some_and(|request| request.why == Why::Down);
         let same =
             |other: &&Batch| other.requests.first().map(|r| r.requester) == batch.requests.first().map(|r| r.requester);
-        if is_down(&batch) && state.desk.waiting().filter(same).last().is_some_and(is_down) {
+        if is_down(batch) && state.desk.waiting().filter(same).last().is_some_and(is_down) {
             return state;
         }
-        let is_safe = |id: ConfigId| self.worlds.configuration(id).is_some_and(|c| c.safe);
-        let mut begun: SmallVec<[(u32, SmallVec<[Request; 2]>); 2]> = SmallVec::new();
-        if batch.requests.iter().any(|request| matches!(request.ask, Ask::Apply(id) if is_safe(id))) {
-            let active_batches: SmallVec<[ActiveBatch; 2]> = state.desk.under_way().iter().cloned().collect();
-            for ActiveBatch { number, batch, .. } in active_batches {
-                let planned = state.planned(number);
+        let before = std::mem::replace(&mut state.desk, coming.desk.clone());
+        if batch.requests.iter().any(|request| matches!(request.ask, Ask::Apply(id) if self.is_safe(id))) {
+            // What has begun was planned as it was asked for.
+            for active in before.under_way() {
+                let planned = state.planned(active.number);
                 if self.worlds.top(planned).is_none() {
-                    let beside = Self::as_begun(&state, number);
-                    let takes = self.worlds.comes(planned, &batch.requests, &beside).takes();
-                    begun.push((number, batch.requests.into_iter().take(takes).collect()));
+                    let beside = as_begun(&before, &state, active.number);
+                    let asks = self.desks.asks_of(&before, active.number);
+                    let takes = self.worlds.comes(planned, &asks, &beside).takes();
+                    self.desks.begun_as(&mut state.desk, &before, active.number, takes);
                 }
             }
         }
-        let is_safe = |id: ConfigId| self.worlds.configuration(id).is_some_and(|c| c.safe);
-        let arrival = state.desk.arrive(batch, is_safe, &self.worlds.claims);
-        // What has begun was planned as it was asked for.
-        begun.into_iter().for_each(|(number, requests)| state.desk.begun_as(number, &requests));
-        for arrived in arrival.in_order() {
+        for arrived in &coming.arrived {
             match arrived {
                 Arrived::Told(request, verdict, _) => {
-                    self.owed(&mut state, &request);
-                    if verdict == Verdict::UndoFailed {
+                    self.owed(&mut state, request);
+                    if *verdict == Verdict::UndoFailed {
                         state.stayed = true;
                         let left = self.frames_left(&state);
-                        let went = self.worlds.stay(state.world, state.world, std::iter::once(request), &left);
+                        let went = self.worlds.stay(state.world, state.world, std::iter::once(*request), &left);
                         self.go(&mut state, &went);
                     }
-                    self.due(&mut state, request, verdict);
+                    self.due(&mut state, *request, *verdict);
                 }
                 Arrived::GivesUp(number, undo) => {
-                    self.owed(&mut state, &undo);
-                    self.give_up(&mut state, number, undo);
+                    self.owed(&mut state, undo);
+                    self.give_up(&mut state, *number, *undo);
                 }
-                Arrived::Safe(request) => self.interrupts(&mut state, request),
+                Arrived::Safe(request) => self.interrupts(&mut state, *request),
             }
         }
         self.begin(&mut state);
@@ -258,27 +227,29 @@ impl Product<'_> {
             }
         }
         self.owed(state, &request);
-        if let Some(world) = self.worlds.get(state.world) {
-            world.note_gone(&request, state.safe.iter(), state.desk.requests_mut());
+        if let Some(world) = self.worlds.get(state.world).filter(|_| request.scope.is_some() && !state.desk.is_empty())
+        {
+            self.desks.change(&mut state.desk, |desk| {
+                world.note_gone(&request, state.safe.iter(), desk.requests_mut());
+            });
         }
         state.safe.push(request);
     }
 
     /// What is under way is given up by its own undo.
     fn give_up(&mut self, state: &mut ProductState, number: u32, undo: Request) {
-        let Some(place) = state.desk.give_up(number, undo) else {
+        let Some(place) = self.desks.give_up(&mut state.desk, number, undo) else {
             // Another undo of the same step has given it up already.
             return self.due(state, undo, Verdict::Undone);
         };
-        let requests = state.desk.active(number).map(|active| active.batch.requests.clone()).unwrap_or_default();
         // What was interrupted was planned before that.
         let planned = state.planned(number);
         let begun = match self.worlds.top(planned) {
             // Where nothing is known what stands behind may have begun with the first, or not.
             Some(_) => place == 0 || self.tells_all,
             None => {
-                let beside = Self::as_begun(state, number);
-                let comes = self.worlds.comes(planned, &requests, &beside);
+                let beside = as_begun(&state.desk, state, number);
+                let comes = self.worlds.comes(planned, &self.desks.asks_of(&state.desk, number), &beside);
                 // What was begun as one stays so, whatever of it is answered now.
                 if comes.takes() > 1 && !beside.joined {
                     state.joined.push(number);
@@ -294,9 +265,10 @@ impl Product<'_> {
     /// What stands behind in its batch, has not begun and was given up, is cancelled.
     pub(super) fn cancel_behind(&self, state: &mut ProductState, number: u32, place: usize) {
         let request = state.desk.active(number).and_then(|active| active.batch.requests.get(place)).copied();
-        let gone = state.desk.answered(number, place, Some(Verdict::Cancelled));
+        let given = AnsweredPlaces::from_iter([(place, Some(Verdict::Cancelled))]);
+        let gone = self.desks.all_answered(&mut state.desk, number, &given);
         request.into_iter().for_each(|request| self.due(state, request, Verdict::Cancelled));
-        gone.undone.into_iter().for_each(|(undo, verdict)| self.due(state, undo, verdict));
+        gone.iter().flat_map(|gone| &gone.undone).for_each(|(undo, verdict)| self.due(state, *undo, *verdict));
     }
 
     /// An answer is on its way, if anybody waits for it (or all are to be given).
@@ -319,12 +291,17 @@ impl Product<'_> {
         }
     }
 
-    /// The next batch that may begin.
-    fn begin_next(&self, state: &mut ProductState) -> Option<ActiveBatch> {
+    /// The next batch that may begin does: its number.
+    fn begin_next(&self, state: &mut ProductState) -> Option<u32> {
         let ProductState { desk, world, leaving, .. } = state;
-        desk.waiting().next()?;
         let alone = |batch: &Batch| *leaving && self.worlds.goes_alone(*world, batch);
-        desk.begin_next(&self.worlds.claims, alone).cloned()
+        if desk.waiting().any(alone) {
+            return self
+                .desks
+                .change(desk, |desk| desk.begin_next(&self.worlds.claims, alone).map(|active| active.number));
+        }
+        desk.waiting().next()?;
+        self.desks.begin_next(desk, &self.worlds.claims)
     }
 
     /// Whatever can begin does; nothing while a safe configuration is being applied.
@@ -332,16 +309,18 @@ impl Product<'_> {
         if !state.safe.is_empty() {
             return;
         }
-        while let Some(active) = self.begin_next(state) {
-            let first = active.batch.requests[0];
+        while let Some(number) = self.begin_next(state) {
+            let begun = state.desk.clone();
+            let Some(ActiveBatch { batch, .. }) = begun.active(number) else { continue };
+            let first = batch.requests[0];
             if first.why != Why::Down {
-                for request in &active.batch.requests {
+                for request in &batch.requests {
                     self.owed(state, request);
                 }
-                self.takes_place(state, active.number);
+                self.takes_place(state, number);
                 continue;
             }
-            state.desk.over(active.number);
+            self.desks.change(&mut state.desk, |desk| desk.over(number));
             if let Some(number) = self.member(first.requester) {
                 state.down |= bit(number);
             }
@@ -364,10 +343,9 @@ impl Product<'_> {
         let ProductState { placed, joined, desk, .. } = &mut *state;
         placed.retain(|of| *of != number && desk.active(*of).is_some());
         joined.retain(|of| desk.active(*of).is_some());
-        let active = state.desk.under_way().iter().find(|active| active.number == number);
-        let Some(requests) = active.map(|active| active.batch.requests.clone()) else { return };
-        if self.worlds.is_tight(state.world, &requests)
-            && !self.comes(state, number, &requests).refused.iter().any(|(_, why)| is_for_room(why))
+        let Some(active) = state.desk.active(number) else { return };
+        if self.worlds.is_tight(state.world, &active.batch.requests)
+            && !self.comes(state, number).refused.iter().any(|(_, why)| is_for_room(why))
         {
             state.placed.push(number);
         }
@@ -415,24 +393,24 @@ impl Product<'_> {
     /// Gives answers, one after the other; each is heard before the next comes.
     pub(super) fn tell(&mut self, mut state: ProductState, answers: Answers, failed: Failed, nexts: &mut Nexts) {
         self.begin(&mut state);
-        // Those that are still to be heard lie with the state: who would hear them may be left by hearing those before.
-        state.telling.extend(answers.iter().copied());
         if self.tells_all && self.members.len() > 1 {
+            state.telling.extend(answers.iter().copied());
             // Each hears it in its own time: what another one asks for meanwhile may come first.
             state.telling.retain(|(request, _)| is_for_somebody(request));
-            let states = if state.in_transit.is_empty() { one(state) } else { self.lands(state) };
-            for state in states {
+            for state in self.lands(state) {
                 let state = self.settle(state);
                 nexts.all.push(Next::answered(Move::Answer, answers.clone(), state, failed));
             }
             return;
         }
+        // Those that are still to be heard lie with the state: who would hear them may be left by hearing those before.
+        state.telling.extend(answers.iter().skip(1).copied());
         // What is in transit may come between what begins now and what is heard now.
-        let mut states = if state.in_transit.is_empty() { one(state) } else { self.lands(state) };
-        for _ in 0..answers.len() {
+        let mut states = self.lands(state);
+        for place in 0..answers.len() {
             let mut heard = States::new();
             for mut state in states {
-                let (request, verdict) = state.telling.remove(0);
+                let (request, verdict) = if place == 0 { answers[0] } else { state.telling.remove(0) };
                 let owner = self.member(request.requester).filter(|_| is_for_somebody(&request));
                 match owner {
                     Some(number) => {

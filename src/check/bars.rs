@@ -4,7 +4,6 @@
 //! What a simulated component reports after a step (`simulated: { reactions }`) comes once. It is still to come where every way
 //! since that step was quick, or led through places alone that would have heard it.
 
-use super::adjacency::Adjacency;
 use super::explore::{Barred, Edge, Graph};
 use super::state::Move;
 use crate::model::monitor::is_monitors;
@@ -23,8 +22,9 @@ impl Graph<'_, '_> {
         let mut asked: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
         for (number, edge) in self.edges.iter().enumerate() {
             let waits = people[edge.from as usize];
-            let again = || matches!(edge.by, Move::Event(at) if self.product.outside[usize::from(at)] == shutdown);
-            bars.push(match (edge.barred, edge.by) {
+            let again =
+                || matches!(self.by(edge), Move::Event(at) if self.product.outside[usize::from(at)] == shutdown);
+            bars.push(match (edge.barred, self.by(edge)) {
                 (Some(Barred::Again), _) if waits && again() => None,
                 (Some(Barred::Late), _) if waits => None,
                 (Some(Barred::Gone), Move::Event(at)) => {
@@ -64,14 +64,15 @@ impl Graph<'_, '_> {
 
     /// These states, and where such edges lead from them.
     pub(super) fn spread_from(&self, mut open: Vec<u32>, leads: impl Fn(usize, &Edge) -> bool) -> Vec<bool> {
-        let edges = self.edges.iter().enumerate().filter(|(number, edge)| leads(*number, edge));
-        let out = Adjacency::new(self.states.len(), edges.map(|(_, edge)| (edge.from, edge.to)));
         let mut reached = vec![false; self.states.len()];
         // Where a coordinator cannot be entered there are none.
         open.retain(|at| (*at as usize) < self.states.len());
         while let Some(at) = open.pop() {
             if !std::mem::replace(&mut reached[at as usize], true) {
-                open.extend(out.of(at));
+                let edges =
+                    self.outgoing().of(at).iter().map(|number| (*number as usize, &self.edges[*number as usize]));
+                let leads = |(number, edge): &(usize, &Edge)| !reached[edge.to as usize] && leads(*number, edge);
+                open.extend(edges.filter(leads).map(|(_, edge)| edge.to));
             }
         }
         reached
@@ -128,7 +129,7 @@ impl Graph<'_, '_> {
         }
         for reaction in raising {
             let set_off = |number: usize| self.sets_off(number, reaction);
-            let is_it = |edge: &Edge| matches!(edge.by, Move::Event(by) if usize::from(by) == at);
+            let is_it = |edge: &Edge| matches!(self.by(edge), Move::Event(by) if usize::from(by) == at);
             let passes = |(number, edge): &(usize, &Edge)| {
                 !set_off(*number) && (is_it(edge) || !edge.quiet && !hears[edge.from as usize])
             };

@@ -1,12 +1,12 @@
 //! What a batch comes to in a world: asked of the stack once, and followed to each end that it may have.
 
+use super::desks::PlainBatch;
 use super::outcome::{Comes, ConcurrentWork, Went, WorldId};
 use super::stands::never;
-use super::world::{Worlds, plain};
+use super::world::Worlds;
 use crate::model::{Ask, Findings};
 use crate::plan::PlannedStep;
 use crate::stack::{Ending, Endings, FrameId, Group, Planned, Reason, Request, Rules, Stopped, settle, take_up};
-use crate::system::step;
 use crate::transaction::can_fail;
 use smallvec::SmallVec;
 use std::rc::Rc;
@@ -14,12 +14,12 @@ use std::sync::Arc;
 
 impl Worlds<'_> {
     /// What the rest of a batch comes to in a world that is known.
-    pub fn comes(&mut self, id: WorldId, requests: &[Request], concurrent: &ConcurrentWork) -> Rc<Comes> {
-        let key = (id, plain(requests), concurrent.clone());
+    pub fn comes(&mut self, id: WorldId, asks: &PlainBatch, concurrent: &ConcurrentWork) -> Rc<Comes> {
+        let key = (id, asks.clone(), concurrent.clone());
         if let Some(known) = self.comes.get(&key) {
             return known.clone();
         }
-        let comes = Rc::new(self.work_out(id, &key.1, concurrent));
+        let comes = Rc::new(self.work_out(id, asks, concurrent));
         self.comes.insert(key, comes.clone());
         comes
     }
@@ -100,18 +100,18 @@ impl Worlds<'_> {
             return Went::to(id);
         }
         let mut world = before.clone();
-        let mut pushed = Vec::new();
+        let (mut pushed, mut system) = (Vec::new(), self.system(id));
         if let Some(planned) = planned {
             let steps = match done == endings.len() {
                 true => &planned.steps[..],
                 false => &planned.whole()[..planned.parts[..done].last().map_or(0, |part| part.range.end as usize)],
             };
-            steps.iter().for_each(|planned| step::effect(&planned.step, &mut world.system));
+            system = self.systems.carry_out(system, &mut world.system, steps);
             pushed = world.take_over(planned.parts.iter().map(|part| &part.edits), endings, held);
         }
         world.keep(requests, &settled);
         let pushed: SmallVec<[FrameId; 2]> = pushed.into_iter().flatten().collect();
-        self.went(id, world, &pushed)
+        self.went(id, world, system, &pushed)
     }
 
     /// The steps of a group, for who shows them.

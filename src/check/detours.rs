@@ -72,7 +72,8 @@ impl Graph<'_, '_> {
         let slow = |at: u32| waits(at) && lasts(at).is_some_and(|lasts| lasts >= within);
         let comes_late = |number: usize| {
             let edge = &self.edges[number];
-            let event = matches!(edge.by, Move::Event(_)) && matches!(bars[number], None | Some(Barred::Reported));
+            let event =
+                matches!(self.by(edge), Move::Event(_)) && matches!(bars[number], None | Some(Barred::Reported));
             event && rests(edge.from) && on[edge.to as usize].is_some_and(|on| !on.is_zero())
         };
         let late: Vec<bool> = (0..self.edges.len()).map(comes_late).collect();

@@ -1,6 +1,5 @@
 //! Whether every way leads down, and what it leaves behind.
 
-use super::adjacency::Adjacency;
 use super::closed::{fails, still_comes};
 use super::explore::{Barred, Edge, Graph};
 use super::judge::Traced;
@@ -11,7 +10,7 @@ use crate::model::codes::{COORD_LEFTOVERS, COORD_NO_WAY_DOWN};
 use crate::model::{ComponentName, Finding, Severity};
 use crate::statechart::{EventId, NodeId};
 use crate::system::View;
-use rustc_hash::{FxHashMap, FxHashSet};
+use rustc_hash::FxHashSet;
 use std::collections::VecDeque;
 
 impl Graph<'_, '_> {
@@ -47,8 +46,9 @@ impl Graph<'_, '_> {
             all.into_iter().filter(|at| !leaves.contains(&self.states[*at as usize].leaves[..])).collect()
         };
         let Some(at) = self.best_first(some).first().copied() else {
-            let told = self.once_down(&reaches, found);
-            return self.failing(told, found);
+            let comes_up = self.comes_up();
+            let told = self.once_down(&reaches, &comes_up, found);
+            return self.failing(&comes_up, told, found);
         };
         let deployment = self.product.deployment;
         let state = &self.states[at as usize];
@@ -74,17 +74,17 @@ impl Graph<'_, '_> {
 
     /// From which states such edges lead to *down*, or to where it is not followed, or to nothing that is known.
     fn reaching_down(&self, counts: impl Fn(usize, &Edge) -> bool) -> Vec<bool> {
-        let edges = self.edges.iter().enumerate().filter(|(number, edge)| counts(*number, edge));
-        let before = Adjacency::new(self.states.len(), edges.map(|(_, edge)| (edge.to, edge.from)));
         let forced = |state: &ProductState| self.product.worlds.top(state.world).is_some();
         let mut reaches = self.arrives();
         // What the broken ends lead to is taken away by force: that is no way down of an intact system.
         let mut open: Vec<u32> = (0u32..).zip(&reaches).filter(|(_, reaches)| **reaches).map(|(at, _)| at).collect();
         open.retain(|at| !forced(&self.states[*at as usize]));
         while let Some(at) = open.pop() {
-            for from in before.of(at) {
-                if !std::mem::replace(&mut reaches[*from as usize], true) {
-                    open.push(*from);
+            for number in self.incoming().of(at) {
+                let edge = &self.edges[*number as usize];
+                if !reaches[edge.from as usize] && counts(*number as usize, edge) {
+                    reaches[edge.from as usize] = true;
+                    open.push(edge.from);
                 }
             }
         }
@@ -95,8 +95,8 @@ impl Graph<'_, '_> {
     /// all, or refused. Where others are not followed with them all of these have to be down at once.
     pub(super) fn goes_on_when_down(&self, also_by_time: bool) -> bool {
         let leads = |edge: &Edge| {
-            let comes = match edge.by {
-                Move::Event(_) => !self.product.is_first_or_last(edge.by),
+            let comes = match self.by(edge) {
+                by @ Move::Event(_) => !self.product.is_first_or_last(by),
                 by => also_by_time && matches!(by, Move::Time(..)),
             };
             comes && self.failed[edge.from as usize] == Failed::Nothing
@@ -119,8 +119,8 @@ impl Graph<'_, '_> {
     /// The event that ends the deployment is raised once, and not all that leads on where it is not being stopped does then:
     /// one finding, of the worst; of several as bad, of what is the first of these in the way somewhere. The state that is
     /// warned of; none: none is.
-    fn once_down(&mut self, reaches: &[bool], found: &mut Traced) -> Option<u32> {
-        let (bars, behind_failed) = (self.bars(), self.behind_failed());
+    fn once_down(&mut self, reaches: &[bool], comes_up: &[bool], found: &mut Traced) -> Option<u32> {
+        let (bars, behind_failed) = (self.bars(), self.behind_failed(comes_up));
         // Where something fails not every coordinator can go on; but a bring-up that has failed is to be led down.
         let expects = |failed: &[Failed], at: u32| failed[at as usize] == Failed::Nothing || behind_failed[at as usize];
         let mut worst: Option<(u32, Finding)> = None;
@@ -235,19 +235,15 @@ impl Graph<'_, '_> {
 
     /// The first move of that kind on the shortest way down.
     fn led_on_by(&self, at: u32, barred: Barred, bars: &[Option<Barred>], reaches: &[bool]) -> Option<Move> {
-        let mut out: FxHashMap<u32, Vec<usize>> = FxHashMap::default();
-        for (number, edge) in self.edges.iter().enumerate() {
-            if bars[number].is_none_or(|of| of >= barred) && reaches[edge.to as usize] {
-                out.entry(edge.from).or_default().push(number);
-            }
-        }
+        let leads =
+            |number: usize| bars[number].is_none_or(|of| of >= barred) && reaches[self.edges[number].to as usize];
         let mut seen: FxHashSet<u32> = std::iter::once(at).collect();
         let mut queue = VecDeque::from([at]);
         while let Some(at) = queue.pop_front() {
-            for number in out.get(&at).into_iter().flatten() {
-                let edge = &self.edges[*number];
-                if bars[*number] == Some(barred) {
-                    return Some(edge.by);
+            for number in self.outgoing().of(at).iter().map(|number| *number as usize).filter(|number| leads(*number)) {
+                let edge = &self.edges[number];
+                if bars[number] == Some(barred) {
+                    return Some(self.by(edge));
                 }
                 if seen.insert(edge.to) {
                     queue.push_back(edge.to);

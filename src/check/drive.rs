@@ -85,7 +85,7 @@ impl Product<'_> {
         if let Some(turn) = state.desk.under_way().first().filter(|_| state.safe.is_empty() && state.due.is_empty()) {
             let (number, requests) = (turn.number, turn.batch.requests.clone());
             if self.worlds.get(state.world).is_some() {
-                let comes = self.comes(state, number, &requests);
+                let comes = self.comes(state, number);
                 if let Some((place, reasons)) = comes.refused.first().or(comes.hollow.first()) {
                     return Err((requests[*place], reasons.to_vec()));
                 }

@@ -2,6 +2,7 @@
 //!
 //! They are looked for among all such moves at once, so that none is too long to be found.
 
+use super::adjacency::Adjacency;
 use super::explore::{Edge, Graph};
 use super::judge::Traced;
 use super::state::{Failed, Move, Next, ProductState};
@@ -9,8 +10,7 @@ use crate::limits;
 use crate::model::codes::COORD_ENDLESS;
 use crate::model::{Finding, Severity};
 use crate::statechart::NodeId;
-use petgraph::algo::kosaraju_scc;
-use petgraph::graph::{DiGraph, NodeIndex};
+
 use rustc_hash::{FxHashMap, FxHashSet};
 use std::collections::VecDeque;
 
@@ -89,7 +89,7 @@ impl Graph<'_, '_> {
         let on: Vec<Edge> =
             self.edges.iter().filter(|edge| edge.quiet && on.contains(&(edge.from, edge.to))).copied().collect();
         for edge in on {
-            let next = edge.place.and_then(|place| self.nexts(edge.from).all.into_iter().nth(place as usize));
+            let next = edge.place().and_then(|place| self.nexts(edge.from).all.into_iter().nth(place));
             match next.as_ref().map(|next| (next.by, &next.answers)) {
                 Some((Move::Taken(number, _), _)) => hearing.push(usize::from(number)),
                 Some((_, answers)) => {
@@ -108,29 +108,29 @@ impl Graph<'_, '_> {
         // Where nothing is known it is not known what is answered, so nothing can be said of cycles.
         let known = |at: u32| self.product.worlds.top(self.states[at as usize].world).is_none();
         let quiet = self.edges.iter().filter(|edge| edge.quiet && known(edge.from) && known(edge.to));
-        let quiet = DiGraph::<(), ()>::from_edges(quiet.map(|edge| (edge.from, edge.to)));
-        let mut of: FxHashMap<u32, usize> = FxHashMap::default();
-        for (number, states) in kosaraju_scc(&quiet).into_iter().enumerate() {
-            if states.len() > 1 || quiet.contains_edge(states[0], states[0]) {
-                of.extend(states.into_iter().filter_map(|at| Some((u32::try_from(at.index()).ok()?, number))));
-            }
-        }
+        let quiet = quiet.map(|edge| (edge.from, edge.to));
+        let itself: FxHashSet<u32> = quiet.clone().filter(|(from, to)| from == to).map(|(at, _)| at).collect();
+        let quiet = Adjacency::new(self.states.len(), quiet);
+        let component = quiet.components();
+        let mut sizes = vec![0u32; component.len()];
+        component.iter().for_each(|number| sizes[*number as usize] += 1);
+        let round = (0u32..).zip(&component).filter(|(at, of)| sizes[**of as usize] > 1 || itself.contains(at));
+        let of: FxHashMap<u32, u32> = round.map(|(at, of)| (at, *of)).collect();
         if of.is_empty() {
             return Vec::new();
         }
-        let mut gone_round: FxHashSet<usize> = FxHashSet::default();
+        let mut gone_round: FxHashSet<u32> = FxHashSet::default();
         let firsts = self.in_order().into_iter().filter(|at| of.get(at).is_some_and(|of| gone_round.insert(*of)));
         firsts.filter_map(|at| cycle(&quiet, &of, at)).collect()
     }
 }
 
 /// A shortest cycle through `at`, of states that all lead to each other.
-fn cycle(quiet: &DiGraph<(), ()>, of: &FxHashMap<u32, usize>, at: u32) -> Option<Vec<u32>> {
+fn cycle(quiet: &Adjacency, of: &FxHashMap<u32, u32>, at: u32) -> Option<Vec<u32>> {
     let mut from: FxHashMap<u32, u32> = FxHashMap::default();
     let mut queue = VecDeque::from([at]);
     while let Some(state) = queue.pop_front() {
-        let next = quiet.neighbors(NodeIndex::from(state)).filter_map(|next| u32::try_from(next.index()).ok());
-        for next in next.filter(|next| of.get(next) == of.get(&at)) {
+        for next in quiet.of(state).iter().rev().copied().filter(|next| of.get(next) == of.get(&at)) {
             if next == at {
                 let mut cycle = vec![state];
                 let mut back = state;

@@ -1,7 +1,8 @@
 //! How what is under way may end.
 
+use super::desks::AnsweredPlaces;
 use super::outcome::{Comes, Went, WorldId};
-use super::product::Product;
+use super::product::{Product, as_begun};
 use super::state::{Answers, Failed, Move, Next, Nexts, ProductState, Trouble, Unconfirmed};
 use super::world::Top;
 use crate::model::{Ask, Verdict};
@@ -17,12 +18,12 @@ const SOME_ASIDE: usize = 4;
 struct End<'e> {
     went: &'e Went,
     /// The requests that are answered: place and verdict; none: nobody is told.
-    given: SmallVec<[(usize, Option<Verdict>); 2]>,
+    given: AnsweredPlaces,
     class: Failed,
 }
 
 /// Who is answered what, as it is settled.
-fn given(settled: &Settled) -> SmallVec<[(usize, Option<Verdict>); 2]> {
+fn given(settled: &Settled) -> AnsweredPlaces {
     settled.answers.iter().map(|(place, verdict, _)| (*place, *verdict)).collect()
 }
 
@@ -37,7 +38,7 @@ impl Product<'_> {
         if let Some(top) = self.worlds.top(state.world) {
             return self.ends_somehow(state, number, top, &requests, nexts);
         }
-        let comes = self.comes(state, number, &requests);
+        let comes = self.comes(state, number);
         for (place, reasons) in &comes.refused {
             if requests[*place].requester != Requester::Operator {
                 nexts.troubles.push(Trouble::Refused(requests[*place], reasons.clone()));
@@ -130,7 +131,7 @@ impl Product<'_> {
         requests: &[Request],
         comes: &Comes,
         endings: &[Ending],
-        given: SmallVec<[(usize, Option<Verdict>); 2]>,
+        given: AnsweredPlaces,
         nexts: &mut Nexts,
     ) {
         let Some(went) = comes.went(endings) else { return self.broke(state, number, requests, given, nexts) };
@@ -161,7 +162,7 @@ impl Product<'_> {
         state: &ProductState,
         number: u32,
         requests: &[Request],
-        given: SmallVec<[(usize, Option<Verdict>); 2]>,
+        given: AnsweredPlaces,
         nexts: &mut Nexts,
     ) {
         let world = self.worlds.broken(state.world, requests.iter().map(|request| request.ask));
@@ -180,19 +181,22 @@ impl Product<'_> {
         next.interrupted.retain(|of| of.number != number);
         next.joined.retain(|of| *of != number);
         next.placed.retain(|of| *of != number);
-        let gone = next.desk.all_answered(number, given.iter().copied());
+        let gone = self.desks.all_answered(&mut next.desk, number, given);
         let mut answers = Answers::new();
-        for ((place, verdict), gone) in given.iter().zip(gone) {
+        for ((place, verdict), gone) in given.iter().zip(gone.iter()) {
             let (request, Some(verdict)) = (requests[*place], *verdict) else { continue };
             self.applied(&mut next, &request, verdict, went);
             answers.push(request.as_told(verdict));
-            answers.extend(gone.undone);
+            answers.extend(gone.undone.iter().copied());
         }
         let undo_failed = given
             .iter()
             .filter(|(_, verdict)| *verdict == Some(Verdict::UndoFailed))
             .map(|(place, _)| requests[*place]);
         let undo_failed: SmallVec<[Request; 2]> = undo_failed.collect();
+        if undo_failed.is_empty() {
+            return self.goes_on_behind(next, number, answers, *class, nexts);
+        }
         for next in self.undos_failed(next, &undo_failed) {
             self.goes_on_behind(next, number, answers.clone(), *class, nexts);
         }
@@ -272,7 +276,7 @@ impl Product<'_> {
             }
             return;
         }
-        let comes = self.comes(state, number, &requests);
+        let comes = self.comes(state, number);
         let first = |given_up: &[usize]| comes.group.places.iter().position(|place| given_up.contains(place));
         // It may be refused by now, or have been; or it was on its way back, or through, when that came.
         if self.tells_all || first(&given_up).is_none() {
@@ -319,8 +323,8 @@ impl Product<'_> {
         given_up: &[usize],
         nexts: &mut Nexts,
     ) {
-        let concurrent = Self::as_begun(state, number);
-        let comes = self.worlds.comes(planned, requests, &concurrent);
+        let concurrent = as_begun(&state.desk, state, number);
+        let comes = self.worlds.comes(planned, &self.desks.asks_of(&state.desk, number), &concurrent);
         let parts = comes.group.places.iter().enumerate();
         let given_up: SmallVec<[usize; 2]> =
             parts.filter(|(_, place)| given_up.contains(place)).map(|(part, _)| part).collect();
@@ -368,10 +372,12 @@ impl Product<'_> {
         self.safe_told(next, request, verdict, class, nexts);
         nexts.all[from..].iter_mut().for_each(|next| next.deep = (comes.done.deep, comes.done.left));
         // What is under way may have made or changed what it finds, and goes on while it is applied.
-        let claim = self.worlds.claims.of([request]);
-        let meets =
-            state.desk.under_way().iter().any(|active| self.worlds.claims.of(&active.batch.requests).meets(&claim));
-        if comes.may_fail || meets {
+        let meets = || {
+            let claim = self.worlds.claims.of([request]);
+            let mut under_way = state.desk.under_way().iter();
+            under_way.any(|active| self.worlds.claims.of(&active.batch.requests).meets(&claim))
+        };
+        if comes.may_fail || meets() {
             let top = Top { safe: true, actuator: self.worlds.has_actuator(state.world) };
             let mut next = over;
             next.world = self.worlds.topped(top, std::iter::once(request.ask));

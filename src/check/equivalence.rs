@@ -46,8 +46,8 @@ impl FrameBook {
     }
 
     /// Whether two frames share anything.
-    pub fn share(&mut self, a: &Arc<Frame>, b: &Arc<Frame>) -> bool {
-        let (FrameNumber(x), FrameNumber(y)) = (self.number(a), self.number(b));
+    pub fn share(&mut self, (a, x): (&Frame, FrameNumber), (b, y): (&Frame, FrameNumber)) -> bool {
+        let (FrameNumber(x), FrameNumber(y)) = (x, y);
         let key = (x.min(y), x.max(y));
         if let Some(known) = self.shares.get(&key) {
             return *known;

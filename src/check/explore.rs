@@ -3,6 +3,7 @@
 //! What can be reached without anything failing is followed first, the shortest way first; then what failed applications
 //! lead to, then failed undoings, then what is broken. A state belongs to the least of these over all ways to it.
 
+use super::adjacency::Adjacency;
 use super::bound::Bound;
 use super::effort::{Far, Halt};
 use super::once::Once;
@@ -14,8 +15,9 @@ use super::world::Top;
 use crate::limits;
 use crate::model::{Ask, ConfigId, Findings, Verdict};
 use crate::stack::Requester;
-use indexmap::IndexSet;
+use indexmap::{IndexMap, IndexSet};
 use rustc_hash::{FxBuildHasher, FxHashMap, FxHashSet};
+use std::cell::OnceCell;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::rc::Rc;
@@ -27,10 +29,10 @@ pub struct Edge {
     pub from: u32,
     /// To where.
     pub to: u32,
-    /// Its place among the moves from there; none: so many rounds of a cycle.
-    pub place: Option<u32>,
-    /// What leads there.
-    pub by: Move,
+    /// Its place among the moves from there; [`NOWHERE`]: so many rounds of a cycle.
+    place: u32,
+    /// What leads there, by its number among [`Graph::moves`].
+    by: u32,
     /// What failed in it.
     pub failed: Failed,
     /// No time passes, and no step fails: an answer is given, or heard, or an event is taken.
@@ -41,6 +43,13 @@ pub struct Edge {
     pub dropped: bool,
     /// As far as this move alone tells, a script can bring it about.
     pub shown: bool,
+}
+
+impl Edge {
+    /// Its place among the moves from there; none: so many rounds of a cycle.
+    pub fn place(&self) -> Option<usize> {
+        (self.place != NOWHERE).then_some(self.place as usize)
+    }
 }
 
 /// Why a way down by a move is none for a deployment that is being stopped.
@@ -70,6 +79,8 @@ pub struct Graph<'p, 'a> {
     pub followed: Vec<bool>,
     /// What leads from one to another.
     pub edges: Vec<Edge>,
+    /// The moves that do, and why they lead none down that is being stopped.
+    moves: IndexMap<Move, Option<Barred>, FxBuildHasher>,
     /// What is wrong, and where.
     pub troubles: Vec<(u32, Trouble)>,
     /// What planning warns of, and where.
@@ -86,6 +97,8 @@ pub struct Graph<'p, 'a> {
     pub(super) gone_round: FxHashMap<(ConfigId, Requester), FxHashSet<WorldId>>,
     /// Behind undoings that failed only one batch at a time is followed, and no races.
     lean: Option<bool>,
+    out: OnceCell<Adjacency>,
+    into: OnceCell<Adjacency>,
     pub(super) depth: Vec<u32>,
     once: Once,
     open: BinaryHeap<Reverse<(Failed, u32, u32)>>,
@@ -122,6 +135,7 @@ pub fn explore<'p, 'a>(product: &'p mut Product<'a>) -> Graph<'p, 'a> {
         failed: Vec::new(),
         followed: Vec::new(),
         edges: Vec::new(),
+        moves: IndexMap::default(),
         troubles: Vec::new(),
         warned: Vec::new(),
         deep: Vec::new(),
@@ -130,6 +144,8 @@ pub fn explore<'p, 'a>(product: &'p mut Product<'a>) -> Graph<'p, 'a> {
         pushes: FxHashMap::default(),
         gone_round: FxHashMap::default(),
         lean: None,
+        out: OnceCell::new(),
+        into: OnceCell::new(),
         depth: Vec::new(),
         once: Once::default(),
         open: BinaryHeap::new(),
@@ -254,7 +270,7 @@ impl Graph<'_, '_> {
         let shows = self.product.shows(&state);
         let mut all = nexts.all;
         for (place, next) in all.drain(..).enumerate() {
-            let place = u32::try_from(place).ok();
+            let place = u32::try_from(place).unwrap_or(NOWHERE);
             if let Some(deep) = next.deep.0 {
                 // Of what was set aside the same may be applied anew without its frame being one more.
                 if !state.aside {
@@ -292,7 +308,6 @@ impl Graph<'_, '_> {
             };
             let failed = next.failed;
             let quiet = failed == Failed::Nothing && matches!(next.by, Move::Answer | Move::Taken(..));
-            let barred = state.stopping.then(|| self.product.barred(next.by)).flatten();
             let dropped = matches!(next.by, Move::Dropped(_));
             let shown = !next.state.aside && shows.shows(self.product, &state, &next);
             let by = next.by;
@@ -307,9 +322,40 @@ impl Graph<'_, '_> {
             if class == Failed::Nothing && !reacts.is_empty() {
                 self.reacts.insert(u32::try_from(self.edges.len()).unwrap_or(NOWHERE), reacts);
             }
+            let by = self.moved(by);
+            let barred = self.moves[by as usize].filter(|_| state.stopping);
             self.edges.push(Edge { from: at, to, place, by, failed: class, quiet, barred, dropped, shown });
         }
         self.product.spare = all;
+    }
+
+    /// The numbers of the edges from each state, once all were followed.
+    pub(super) fn outgoing(&self) -> &Adjacency {
+        let edges = || (0u32..).zip(&self.edges).map(|(number, edge)| (edge.from, number));
+        self.out.get_or_init(|| Adjacency::new(self.states.len(), edges()))
+    }
+
+    /// Of those to each state.
+    pub(super) fn incoming(&self) -> &Adjacency {
+        let edges = || (0u32..).zip(&self.edges).map(|(number, edge)| (edge.to, number));
+        self.into.get_or_init(|| Adjacency::new(self.states.len(), edges()))
+    }
+
+    /// What leads along an edge.
+    pub(super) fn by(&self, edge: &Edge) -> Move {
+        self.moves.get_index(edge.by as usize).map_or(Move::Rounds, |(by, _)| *by)
+    }
+
+    fn moved(&mut self, by: Move) -> u32 {
+        let known = self.moves.get_index_of(&by);
+        let number = known.unwrap_or_else(|| self.moves.insert_full(by, self.product.barred(by)).0);
+        u32::try_from(number).unwrap_or(NOWHERE)
+    }
+
+    /// A cycle is gone round so often that it leads there.
+    pub(super) fn rounds_lead(&mut self, from: u32, to: u32, failed: Failed, shown: bool) {
+        let (by, barred) = (self.moved(Move::Rounds), None);
+        self.edges.push(Edge { from, to, place: NOWHERE, by, failed, quiet: false, barred, dropped: false, shown });
     }
 
     /// Whether the step of a reaction is done on an edge, as far as nothing fails.

@@ -14,7 +14,7 @@ use rustc_hash::FxHashSet;
 
 impl Graph<'_, '_> {
     /// Which states a deployment comes to before it is up, or has failed.
-    fn comes_up(&self) -> Vec<bool> {
+    pub(super) fn comes_up(&self) -> Vec<bool> {
         let state = |at: u32| &self.states[at as usize];
         // What operators ask for there is asked for later.
         let waits = |at: u32| self.product.members.iter().any(|member| state(at).outstanding(member.by) > 0);
@@ -28,7 +28,7 @@ impl Graph<'_, '_> {
     }
 
     /// The states in which a bring-up has failed and rests, with nothing worse than a configuration that was not applied.
-    pub(super) fn failed_bring_ups(&self) -> Vec<u32> {
+    fn failed_bring_ups(&self, comes_up: &[bool]) -> Vec<u32> {
         if self.product.members.iter().all(|member| member.failed.is_empty()) {
             return Vec::new();
         }
@@ -36,20 +36,19 @@ impl Graph<'_, '_> {
         let failed = |at: u32| self.product.failed_in(state(at)).is_some();
         let known = |at: u32| self.product.worlds.top(state(at).world).is_none();
         let expected = |at: u32| self.failed[at as usize] <= Failed::Apply;
-        let comes_up = (0u32..).zip(self.comes_up()).filter(|(_, comes_up)| *comes_up).map(|(at, _)| at);
+        let comes_up = (0u32..).zip(comes_up).filter(|(_, comes_up)| **comes_up).map(|(at, _)| at);
         comes_up.filter(|at| failed(*at) && state(*at).is_at_rest() && known(*at) && expected(*at)).collect()
     }
 
     /// Where it is stopped after a bring-up that has failed, nothing failing any more.
-    pub(super) fn behind_failed(&self) -> Vec<bool> {
-        let failed = self.failed_bring_ups();
+    pub(super) fn behind_failed(&self, comes_up: &[bool]) -> Vec<bool> {
+        let failed = self.failed_bring_ups(comes_up);
         let stops = |_: usize, edge: &Edge| self.states[edge.to as usize].stopping && edge.failed == Failed::Nothing;
         self.spread_from(failed, stops)
     }
 
     /// Where it rests, with something left, when it was stopped before it was up and nobody heard that.
-    fn rests_unheard(&self) -> Vec<u32> {
-        let comes_up = self.comes_up();
+    fn rests_unheard(&self, comes_up: &[bool]) -> Vec<u32> {
         let state = |at: u32| &self.states[at as usize];
         let dropped = self.edges.iter().filter(|edge| edge.dropped && comes_up[edge.from as usize]);
         // The event comes once.
@@ -64,7 +63,7 @@ impl Graph<'_, '_> {
         let open = (0u32..).zip(open).filter(|(_, open)| *open).map(|(at, _)| at);
         // That it is let go comes by itself.
         let until = self.product.deployment.interface.leaving.map(|leaving| leaving.until);
-        let let_go = |edge: &&Edge| match edge.by {
+        let let_go = |edge: &&Edge| match self.by(edge) {
             Move::Event(at) => Some(self.product.outside[usize::from(at)]) == until,
             _ => false,
         };
@@ -76,15 +75,15 @@ impl Graph<'_, '_> {
     }
 
     /// That nobody hears the event that ends the deployment where a bring-up has failed, or is stopped; `told` is told already.
-    pub(super) fn failing(&mut self, told: Option<u32>, found: &mut Traced) {
-        let failed = self.failed_bring_ups();
+    pub(super) fn failing(&mut self, comes_up: &[bool], told: Option<u32>, found: &mut Traced) {
+        let failed = self.failed_bring_ups(comes_up);
         let is_listed = |graph: &Self, at: u32| {
             let leaves = &graph.states[at as usize].leaves;
             failed.iter().any(|failed| graph.states[*failed as usize].leaves == *leaves)
         };
         // Where something has failed that it is not known to mean the end, not every coordinator can go on.
         let warned = |graph: &Self, at: u32| graph.failed[at as usize] == Failed::Nothing || is_listed(graph, at);
-        let all = self.rests_unheard();
+        let all = self.rests_unheard(comes_up);
         let some: Vec<u32> = all.iter().copied().filter(|at| warned(self, *at)).collect();
         let severity = if some.is_empty() { Severity::Info } else { Severity::Warning };
         let Some(at) = self.best_first(if some.is_empty() { all } else { some }).first().copied() else { return };

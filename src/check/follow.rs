@@ -124,7 +124,7 @@ impl<'a> Follower<'a> {
             Seen::Operator { ask, force } => {
                 for state in rest.iter().filter(|state| is_quiet(state)) {
                     let request = Request { force, ..Request::new(RequestId(0), ask, Requester::Operator) };
-                    let states = self.product.arrive(state.clone(), Batch::one(request));
+                    let states = self.product.arrive(state.clone(), &Batch::one(request));
                     next.extend(states.into_iter().map(|state| {
                         let state = self.product.settle(state);
                         May { state, owed: Answers::new() }

@@ -1,20 +1,21 @@
 //! Frames of a world: which are held by what is under way, which stay though the state they belonged to was left, and how one
 //! is found again in the world that follows.
 
+use super::desks::PlainBatch;
 use super::outcome::{ConcurrentWork, Held, Went, WorldId};
-use super::world::{Worlds, plain};
+use super::world::Worlds;
 use crate::model::ConfigId;
 use crate::stack::{Batch, Frame, FrameId, Request, Requester, Stack, held};
 use smallvec::SmallVec;
 
 impl Worlds<'_> {
     /// The frames that a batch under way pops or hands over to.
-    pub fn held_by(&mut self, id: WorldId, requests: &[Request], begun: &ConcurrentWork) -> Held {
-        let key = (id, plain(requests), begun.clone());
+    pub fn held_by(&mut self, id: WorldId, asks: &PlainBatch, begun: &ConcurrentWork) -> Held {
+        let key = (id, asks.clone(), begun.clone());
         if let Some(known) = self.helds.get(&key) {
             return known.clone();
         }
-        let group = self.group(id, &key.1, begun);
+        let group = self.group(id, asks, begun);
         let planned = group.and_then(|group| group.planned);
         let held: Held = planned.iter().flat_map(held).collect();
         self.helds.insert(key, held.clone());
@@ -22,8 +23,8 @@ impl Worlds<'_> {
     }
 
     /// The frames that undos of a batch under way are about and that stay, since these are refused.
-    pub fn staying(&self, id: WorldId, requests: &[Request], begun: &ConcurrentWork) -> Held {
-        let group = self.group(id, &plain(requests), begun);
+    pub fn staying(&self, id: WorldId, asks: &PlainBatch, begun: &ConcurrentWork) -> Held {
+        let group = self.group(id, asks, begun);
         group.iter().flat_map(|group| &group.stay).map(|(_, frame)| *frame).collect()
     }
 
@@ -70,7 +71,7 @@ impl Worlds<'_> {
         let Some(before) = self.get(id).filter(|_| !stay.is_empty()) else { return Went::to(id) };
         let mut world = before.clone();
         stay.iter().for_each(|frame| world.stack.unscope(*frame));
-        self.went(id, world, &[])
+        self.went(id, world, self.system(id), &[])
     }
 
     /// The place of a frame that counts.
@@ -81,11 +82,6 @@ impl Worlds<'_> {
     /// The number of the frame that counts at that place.
     pub fn frame(&self, id: WorldId, place: u8) -> Option<FrameId> {
         self.ids(id).get(usize::from(place)).copied()
-    }
-
-    /// Whether frames have been squashed.
-    pub fn is_piled_up(&self, id: WorldId) -> bool {
-        self.get(id).is_some_and(|world| world.stack.frames().iter().any(|frame| frame.is_squashed()))
     }
 
     /// Whether frames have been squashed somewhere, and which of them goes back to an order that was not followed everywhere.

@@ -76,11 +76,8 @@ impl Product<'_> {
     ) {
         for Takes { event, places, .. } in takes {
             let mut next = state.clone();
-            let mut at = 0;
-            next.inbox.retain(|_| {
-                at += 1;
-                !places.contains(&(at - 1))
-            });
+            let stays = state.inbox.iter().enumerate().filter(|(at, _)| !places.contains(at));
+            next.inbox = stays.map(|(_, lies)| *lies).collect();
             self.hear(next, number, event, Move::Taken(index(number), event), nexts);
         }
     }

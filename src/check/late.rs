@@ -47,7 +47,7 @@ impl Graph<'_, '_> {
     pub(super) fn by_itself(&self, places: &Places, last: Vec<usize>, leads: impl Fn(&Leg) -> bool) -> ByItself {
         let cost = |number: usize| {
             let leg = &places.legs[number];
-            let by = self.edges[leg.edge].by;
+            let by = self.by(&self.edges[leg.edge]);
             let first = !comes_by_itself(leg, by) || places.due[leg.from].is_none_or(|due| leg.takes <= due);
             let goes = first && !leg.late && leads(leg);
             goes.then(|| Cost(u32::from(matches!(by, Move::Event(_)) && !leg.reported), leg.takes, 1))
@@ -91,7 +91,7 @@ impl Graph<'_, '_> {
         let prolongs = |number: &usize| {
             let leg = &places.legs[*number];
             let itself = by_itself.legs[leg.from].map(|own| &places.legs[own]);
-            let waits = itself.filter(|own| comes_by_itself(own, self.edges[own.edge].by));
+            let waits = itself.filter(|own| comes_by_itself(own, self.by(&self.edges[own.edge])));
             leg.late && counts(leg.edge) && waits.is_some_and(|own| on[leg.to] > on[own.to])
         };
         let mut out: Vec<Vec<usize>> = by_itself.legs.iter().map(|leg| leg.iter().copied().collect()).collect();
@@ -136,7 +136,7 @@ impl Graph<'_, '_> {
         while let Some((_, number)) = after[at] {
             let leg = &places.legs[number];
             if leg.late {
-                late.again |= !late.events.insert(self.product.named(self.edges[leg.edge].by));
+                late.again |= !late.events.insert(self.product.named(self.by(&self.edges[leg.edge])));
             }
             if !seen.insert(at) {
                 break;

@@ -33,7 +33,7 @@ pub struct Member<'a> {
 impl<'a> Member<'a> {
     /// From now on it hears these events from outside.
     pub fn listen(&mut self, deployment: &'a Deployment, outside: &[EventName]) {
-        self.reactions = Some(Reactions::new(deployment, self.chart, outside, self.down));
+        self.reactions = Some(Reactions::new(deployment, self.chart, outside, self.by, self.down));
     }
 
     /// Where it is to come for the deployment to be up: one of a subsystem may be anywhere, its parent decides.

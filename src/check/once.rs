@@ -1,10 +1,10 @@
-//! What states of the product are made of, kept once: of a hundred thousand states most have lists and a desk that others have as
+//! What states of the product are made of, kept once: of a hundred thousand states most have lists that others have as
 //! well, come to on other ways.
 
-use super::shared_list::{Shared, SharedList};
+use super::shared_list::SharedList;
 use super::state::{Interrupted, ProductState, Unconfirmed};
 use crate::model::{ComponentName, ConfigId, Verdict};
-use crate::stack::{Batch, Desk, Request};
+use crate::stack::{Batch, Request};
 use crate::statechart::EventId;
 use rustc_hash::FxHashSet;
 use std::hash::Hash;
@@ -12,7 +12,6 @@ use std::hash::Hash;
 /// All that was met of each kind.
 #[derive(Default)]
 pub(super) struct Once {
-    desks: FxHashSet<Shared<Desk>>,
     interrupted: FxHashSet<SharedList<Interrupted>>,
     numbers: FxHashSet<SharedList<u32>>,
     requests: FxHashSet<SharedList<Request>>,
@@ -27,7 +26,6 @@ pub(super) struct Once {
 impl Once {
     /// The state, made of what is kept already where it has the same.
     pub fn share(&mut self, state: &mut ProductState) {
-        one(&mut self.desks, &mut state.desk);
         list(&mut self.interrupted, &mut state.interrupted);
         for own in [&mut state.joined, &mut state.placed] {
             list(&mut self.numbers, own);
@@ -47,12 +45,9 @@ impl Once {
 }
 
 fn list<T: Eq + Hash>(kept: &mut FxHashSet<SharedList<T>>, own: &mut SharedList<T>) {
-    if !own.is_empty() {
-        one(kept, own);
+    if own.is_empty() {
+        return;
     }
-}
-
-fn one<T: Eq + Hash + Clone>(kept: &mut FxHashSet<T>, own: &mut T) {
     match kept.get(own) {
         Some(known) => *own = known.clone(),
         None => _ = kept.insert(own.clone()),

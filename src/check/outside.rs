@@ -41,7 +41,7 @@ impl Product<'_> {
     fn safe_comes_elsewhere(&mut self, state: &ProductState, nexts: &mut Nexts) {
         let Some(id) = self.elsewhere.filter(|_| self.minds_elsewhere && !state.desk.is_empty()) else { return };
         let request = Request::new(RequestId(0), Ask::Apply(id), Requester::Safety);
-        for mut next in self.arrive(state.clone(), Batch::one(request)) {
+        for mut next in self.arrive(state.clone(), &Batch::one(request)) {
             // What is on its way only is what comes a moment later.
             if !next.in_transit.is_empty() {
                 continue;
@@ -229,7 +229,8 @@ impl Product<'_> {
         left.unconfirmed.remove(at);
         if self.tells_all {
             // It is a request like others, and takes its time.
-            let _ = left.desk.arrive(Batch::one(request), |_| false, &self.worlds.claims);
+            self.desks
+                .change(&mut left.desk, |desk| _ = desk.arrive(Batch::one(request), |_| false, &self.worlds.claims));
             self.begin(&mut left);
             nexts.all.push(Next::plain(Move::Confirmed(id), left, Failed::Nothing));
             return;
@@ -238,7 +239,7 @@ impl Product<'_> {
             return;
         }
         let concurrent = self.concurrent_work(&left, None);
-        let comes = self.worlds.comes(state.world, &[request], &concurrent);
+        let comes = self.worlds.comes(state.world, &self.desks.asks(&[request]), &concurrent);
         let told = |verdict: Verdict| Answers::from_iter([request.as_told(verdict)]);
         if !comes.refused.is_empty() {
             nexts.troubles.extend(comes.refused.iter().map(|(_, why)| Trouble::Refused(request, why.clone())));
@@ -310,7 +311,7 @@ impl Product<'_> {
         for ask in asks {
             let request = Request::new(RequestId(0), ask, Requester::Operator);
             let by_hand = matches!(ask, Ask::Apply(id) if self.is_safe(id));
-            for next in self.arrive(state.clone(), Batch::one(request)) {
+            for next in self.arrive(state.clone(), &Batch::one(request)) {
                 let next = Next::plain(Move::Operator(ask), self.settle(next), Failed::Nothing);
                 nexts.all.push(Next { by_hand, ..next });
             }

@@ -60,23 +60,23 @@ impl Graph<'_, '_> {
         let mut answers: FxHashMap<u32, Vec<usize>> = FxHashMap::default();
         for number in edges {
             let edge = &self.edges[*number];
-            if let Move::Time(number_of, event) = edge.by {
+            if let Move::Time(number_of, event) = self.by(edge) {
                 timers.insert(*number, Timers::from_iter([Timer::Time(usize::from(number_of), event)]));
-            } else if let (Move::Event(at), Some(Barred::Gone)) = (edge.by, edge.barred) {
+            } else if let (Move::Event(at), Some(Barred::Gone)) = (self.by(edge), edge.barred) {
                 let raises = |name: EventName| self.product.alike_to(at).any(|alike| alike == name);
                 let of = self.product.delayed().filter(|(_, reaction)| raises(reaction.raise));
                 let of: Timers = of.map(|(reaction, _)| Timer::Reports(reaction)).collect();
                 if !of.is_empty() {
                     timers.insert(*number, of);
                 }
-            } else if edge.by == Move::Answer && self.product.may_wait(&self.states[edge.from as usize]) {
+            } else if self.by(edge) == Move::Answer && self.product.may_wait(&self.states[edge.from as usize]) {
                 answers.entry(edge.from).or_default().push(*number);
             }
         }
         for (from, numbers) in answers {
             let nexts = self.nexts(from).all;
             for number in numbers {
-                let next = self.edges[number].place.and_then(|place| nexts.get(place as usize));
+                let next = self.edges[number].place().and_then(|place| nexts.get(place));
                 let of = next.map(|next| self.product.answered_after(next)).unwrap_or_default();
                 if !of.is_empty() {
                     timers.insert(number, of);
@@ -99,7 +99,7 @@ impl Graph<'_, '_> {
     /// What an edge waits for where this is to wait for: an event for what reports it first, if something does.
     fn waits_of(&self, number: usize, timers: &FxHashMap<usize, Timers>, waits: &[Wait]) -> Timers {
         let Some(all) = timers.get(&number) else { return Timers::new() };
-        if !matches!(self.edges[number].by, Move::Event(_)) {
+        if !matches!(self.by(&self.edges[number]), Move::Event(_)) {
             return all.clone();
         }
         let first = waits.iter().filter(|wait| all.contains(&wait.timer)).min_by_key(|wait| wait.left);
@@ -117,7 +117,7 @@ impl Graph<'_, '_> {
                 continue;
             }
             // What leads there tells it, but for answers.
-            let (before, next) = match edge.by {
+            let (before, next) = match self.by(&edge) {
                 Move::Answer => self.gone(u32::try_from(*number).unwrap_or(u32::MAX)),
                 by => (from.clone(), Next::plain(by, to.clone(), Failed::Nothing)),
             };
@@ -183,7 +183,9 @@ impl Graph<'_, '_> {
                 let edge = |number: usize| &self.edges[number];
                 let same = |first: usize, second: usize| {
                     let behind = out.get(&edge(first).to).into_iter().flatten();
-                    behind.into_iter().any(|at| edge(*at).by == edge(second).by && edge(*at).to == edge(second).to)
+                    behind
+                        .into_iter()
+                        .any(|at| self.by(edge(*at)) == self.by(edge(second)) && edge(*at).to == edge(second).to)
                 };
                 let comes = |first: usize, second: usize| {
                     let behind = after(first, &waits).0;
@@ -208,7 +210,7 @@ impl Graph<'_, '_> {
             for edge in numbers {
                 let sooner = |timer: &Timer| waits.iter().any(|wait| wait.timer == *timer && wait.sooner);
                 let lasts = takes(&of(edge), &waits);
-                let reported = matches!(self.edges[edge].by, Move::Event(_)) && !of(edge).is_empty();
+                let reported = matches!(self.by(&self.edges[edge]), Move::Event(_)) && !of(edge).is_empty();
                 if let Some(over) = over.filter(|over| lasts > *over && !of(edge).iter().any(sooner)) {
                     all.overtaken.push((from, edge, lasts, over));
                     continue;

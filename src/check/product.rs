@@ -14,16 +14,16 @@ use super::aside::Aside;
 use super::children::{Child, WatchedSubsystem};
 use super::coordinator::outside_events;
 use super::coupling;
+use super::desks::{Desks, PlainBatch};
 use super::effort::{Effort, Left};
 use super::members::{Member, hears_loss, members};
 use super::outcome::{Comes, ConcurrentWork, EMPTY, Held, Went, WorldId};
-use super::reactions::Asked;
-use super::shared_list::{Shared, SharedList};
-use super::state::{Failed, Move, Next, Nexts, ProductState, Reacts, bit, index, one};
+use super::shared_list::SharedList;
+use super::state::{Failed, Move, Next, Nexts, ProductState, Reacts, Unconfirmed, bit, index, one};
 use super::world::Worlds;
 use crate::limits;
-use crate::model::{Catalogue, ConfigId, Deployment, EventName, Precedence, RequestId, Verdict};
-use crate::stack::{FrameId, Request, Requester, Why};
+use crate::model::{Catalogue, ConfigId, Deployment, EventName, Precedence, Verdict};
+use crate::stack::{Desk, FrameId, Request, Requester, Why};
 use crate::statechart::{Chart, EventId, NodeId};
 use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
@@ -39,6 +39,8 @@ pub struct Product<'a> {
     pub members: Vec<Member<'a>>,
     /// What the configurator does.
     pub worlds: Worlds<'a>,
+    /// What waits and what is under way in its states.
+    pub desks: Desks,
     /// Events that come from outside.
     pub outside: Vec<EventName>,
     /// Of each the first that no coordinator tells from it.
@@ -97,7 +99,7 @@ pub struct Product<'a> {
     /// How much more is followed.
     pub(super) effort: Left<'a>,
     /// What is known of reactions to steps.
-    pub(super) reacts: FxHashMap<(WorldId, SmallVec<[Request; 2]>, ConcurrentWork), Reacts>,
+    pub(super) reacts: FxHashMap<(WorldId, PlainBatch, ConcurrentWork), Reacts>,
     /// Room for what follows, used again and again.
     pub(super) spare: Vec<Next>,
 }
@@ -125,6 +127,7 @@ impl<'a> Product<'a> {
             deployment,
             members,
             worlds: Worlds::new(deployment, catalogue, undone),
+            desks: Desks::default(),
             outside: outside.into_iter().collect(),
             alike: Vec::new(),
             operator,
@@ -189,7 +192,7 @@ impl<'a> Product<'a> {
         let state = ProductState {
             leaves: entered.iter().map(|reaction| reaction.leaf).collect(),
             world: EMPTY,
-            desk: Shared::default(),
+            desk: self.desks.empty(),
             interrupted: SharedList::new(),
             joined: SharedList::new(),
             placed: SharedList::new(),
@@ -248,6 +251,9 @@ impl<'a> Product<'a> {
                 false => self.ends(state, number, &mut nexts),
             }
         }
+        if state.telling.is_empty() && state.inbox.is_empty() {
+            return nexts;
+        }
         for number in 0..self.members.len() {
             let own = index(number);
             // Answers go first, but for what is urgent.
@@ -278,8 +284,8 @@ impl<'a> Product<'a> {
         }
         // Those that have nothing to do with each other end in any order.
         for (at, request) in state.safe.iter().enumerate() {
-            let claim = self.worlds.claims.of([request]);
-            let first = state.safe[..at].iter().all(|before| !self.worlds.claims.of([before]).meets(&claim));
+            let claim = |request: &Request| self.worlds.claims.of([request]);
+            let first = state.safe[..at].iter().all(|before| !claim(before).meets(&claim(request)));
             if first && !state.is_owed(request.requester) {
                 self.safe_ends(state, at, nexts);
             }
@@ -323,32 +329,33 @@ impl<'a> Product<'a> {
     /// Takes over a world.
     pub(super) fn go(&self, state: &mut ProductState, went: &Went) {
         let from = std::mem::replace(&mut state.world, went.world);
-        if let Some(places) = &went.places {
+        if let Some(places) = &went.places
+            && state.desk.requests().any(|request| matches!(request.why, Why::Unconfirmed(_)))
+        {
             // Frames have the numbers of their world.
-            for request in state.desk.requests_mut() {
-                if let Why::Unconfirmed(frame) = request.why {
-                    let place = self.worlds.place(from, frame).and_then(|at| places.get(at).copied().flatten());
-                    let frame = place.and_then(|place| self.worlds.frame(went.world, place));
-                    request.why = Why::Unconfirmed(frame.unwrap_or(FrameId(0)));
+            self.desks.change(&mut state.desk, |desk| {
+                for request in desk.requests_mut() {
+                    if let Why::Unconfirmed(frame) = request.why {
+                        let place = self.worlds.place(from, frame).and_then(|at| places.get(at).copied().flatten());
+                        let frame = place.and_then(|place| self.worlds.frame(went.world, place));
+                        request.why = Why::Unconfirmed(frame.unwrap_or(FrameId(0)));
+                    }
                 }
-            }
-        }
-        if let Some(places) = &went.places {
-            state.unconfirmed.retain(|waits| match places.get(usize::from(waits.place)).copied().flatten() {
-                Some(place) => {
-                    waits.place = place;
-                    true
-                }
-                None => false,
             });
+        }
+        if let Some(places) = went.places.as_ref().filter(|_| !state.unconfirmed.is_empty()) {
+            let place = |waits: &Unconfirmed| places.get(usize::from(waits.place)).copied().flatten();
+            let there =
+                state.unconfirmed.iter().filter_map(|waits| Some(Unconfirmed { place: place(waits)?, ..*waits }));
+            state.unconfirmed = there.collect();
         }
         self.review_standings(state);
     }
 
-    /// What `requests` come to in the state's world.
-    pub fn comes(&mut self, state: &ProductState, number: u32, requests: &[Request]) -> Rc<Comes> {
+    /// What a batch under way comes to in the state's world.
+    pub fn comes(&mut self, state: &ProductState, number: u32) -> Rc<Comes> {
         let concurrent = self.concurrent_work(state, Some(number));
-        self.worlds.comes(state.world, requests, &concurrent)
+        self.worlds.comes(state.world, &self.desks.asks_of(&state.desk, number), &concurrent)
     }
 
     /// What stands beside a batch under way (none: beside what does not wait) in the state's world.
@@ -356,21 +363,16 @@ impl<'a> Product<'a> {
         let mut held = Held::new();
         for active in state.desk.under_way().iter().filter(|active| Some(active.number) != number) {
             let planned = state.planned(active.number);
-            let own = self.worlds.held_by(planned, &active.batch.requests, &Self::as_begun(state, active.number));
+            let asks = self.desks.asks_of(&state.desk, active.number);
+            let own = self.worlds.held_by(planned, &asks, &as_begun(&state.desk, state, active.number));
             held.extend(own.into_iter().filter_map(|frame| self.worlds.below(planned, state.world, frame)));
         }
         held.extend(state.unconfirmed.iter().filter_map(|waits| self.worlds.frame(state.world, waits.place)));
         held.sort_unstable();
         held.dedup();
         let placed = number.is_some_and(|number| state.placed.contains(&number));
-        let begun = number.map(|number| Self::as_begun(state, number)).unwrap_or_default();
+        let begun = number.map(|number| as_begun(&state.desk, state, number)).unwrap_or_default();
         ConcurrentWork { held, placed, ..begun }
-    }
-
-    /// How a batch under way has begun.
-    pub(super) fn as_begun(state: &ProductState, number: u32) -> ConcurrentWork {
-        let alone = state.desk.active(number).is_some_and(|active| active.alone);
-        ConcurrentWork { joined: state.joined.contains(&number), alone, ..ConcurrentWork::default() }
     }
 
     /// Frames that undos under way are about, also those of which it is known that they stay: no later undo by leaving the
@@ -379,7 +381,8 @@ impl<'a> Product<'a> {
         let mut left = self.concurrent_work(state, None).held;
         for active in state.desk.under_way() {
             let planned = state.planned(active.number);
-            let stay = self.worlds.staying(planned, &active.batch.requests, &Self::as_begun(state, active.number));
+            let asks = self.desks.asks_of(&state.desk, active.number);
+            let stay = self.worlds.staying(planned, &asks, &as_begun(&state.desk, state, active.number));
             left.extend(stay.into_iter().filter_map(|frame| self.worlds.below(planned, state.world, frame)));
         }
         left
@@ -415,12 +418,12 @@ impl<'a> Product<'a> {
     pub fn member(&self, by: Requester) -> Option<usize> {
         self.members.iter().position(|member| member.by == by)
     }
+}
 
-    /// A request as a coordinator makes it.
-    pub(super) fn request(by: Requester, given: &Asked) -> Request {
-        let tag = given.owner.map_or((0, 0), |owner| (owner.index() as u64 + 1, 0));
-        Request { scope: given.scope, tag, ..Request::new(RequestId(0), given.ask, by) }
-    }
+/// How a batch under way has begun; `desk`: as it stood at the state's desk.
+pub(super) fn as_begun(desk: &Desk, state: &ProductState, number: u32) -> ConcurrentWork {
+    let alone = desk.active(number).is_some_and(|active| active.alone);
+    ConcurrentWork { joined: state.joined.contains(&number), alone, ..ConcurrentWork::default() }
 }
 
 /// Events that come to a coordinator from outside; what others alone raise comes from them, and only then.

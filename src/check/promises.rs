@@ -212,22 +212,17 @@ impl Graph<'_, '_> {
             Move::Taken(number, event) => graph.product.members[usize::from(number)].name_of(event) == Some(until),
             _ => false,
         };
-        let mut of: FxHashMap<u32, Vec<u32>> = FxHashMap::default();
-        for (number, edge) in (0u32..).zip(&self.edges) {
-            of.entry(edge.from).or_default().push(number);
-        }
         let mut met: FxHashSet<u32> = FxHashSet::default();
         let mut open: VecDeque<u32> = VecDeque::new();
-        for edge in 0..self.edges.len() {
-            let (from, to, by) = (self.edges[edge].from, self.edges[edge].to, self.edges[edge].by);
-            if says(self, from, to) && !ends(self, by) && met.insert(to) {
-                open.push_back(to);
+        for edge in &self.edges {
+            if says(self, edge.from, edge.to) && !ends(self, self.by(edge)) && met.insert(edge.to) {
+                open.push_back(edge.to);
             }
         }
         while let Some(at) = open.pop_front() {
-            for edge in of.get(&at).into_iter().flatten() {
-                let edge = self.edges[*edge as usize];
-                if !ends(self, edge.by) && met.insert(edge.to) {
+            for edge in self.outgoing().of(at) {
+                let edge = &self.edges[*edge as usize];
+                if !ends(self, self.by(edge)) && met.insert(edge.to) {
                     open.push_back(edge.to);
                 }
             }

@@ -4,33 +4,14 @@
 //! its way to rest it may take several steps; what each of them raises is a batch of its own, as in a running session.
 
 use super::coordinator::ask_of;
+use super::desks::is_left;
 use crate::model::statechart::FunctionId;
-use crate::model::{Ask, Deployment, EventName};
-use crate::stack::Scope;
+use crate::model::{Ask, Deployment, EventName, RequestId};
+use crate::stack::{Batch, Request, Requester, Scope, Why};
 use crate::statechart::{Chart, Doo, EdgeId, EventId, Hook, HookContext, Machine, NodeId, Raised};
 use crate::time::Time;
 use rustc_hash::FxHashMap;
 use std::rc::Rc;
-
-/// A request that was made.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Asked {
-    /// What is asked.
-    pub ask: Ask,
-    /// Who hears the answer; none: it has been left since.
-    pub owner: Option<NodeId>,
-    /// The state that brings it with it, by being entered, or takes it back, by being left.
-    pub scope: Option<Scope>,
-}
-
-/// What a step hands on.
-#[derive(Debug, Clone)]
-pub enum Handed {
-    /// Requests, in the order they were made.
-    Batch(Vec<Asked>),
-    /// It has come to the state that means down.
-    Down,
-}
 
 /// What one event leads to, until the coordinator is at rest again.
 #[derive(Debug, Clone)]
@@ -39,8 +20,8 @@ pub struct Macrostep {
     pub leaf: NodeId,
     /// Whether a transition was taken at all.
     pub taken: bool,
-    /// What its steps hand on, in order.
-    pub handed: Vec<Handed>,
+    /// What its steps ask for, in order; also that it has come to the state that means down.
+    pub handed: Vec<Batch>,
     /// States that were left, at least once.
     pub left: Vec<NodeId>,
     /// Names that were raised and ask for nothing, in order.
@@ -55,13 +36,20 @@ pub struct Reactions<'a> {
     table: FxHashMap<(NodeId, EventId), Rc<Macrostep>>,
     offers: FxHashMap<NodeId, Rc<Vec<EventId>>>,
     outside: Vec<EventId>,
+    by: Requester,
     down: Option<NodeId>,
 }
 
 impl<'a> Reactions<'a> {
-    /// An empty table. `outside` are the events that can come from components and operators; `down` the state that means
-    /// down.
-    pub fn new(deployment: &'a Deployment, chart: &'a Chart, outside: &[EventName], down: Option<NodeId>) -> Self {
+    /// An empty table. `outside` are the events that can come from components and operators; `by` is who asks, and `down` its state
+    /// that means down.
+    pub fn new(
+        deployment: &'a Deployment,
+        chart: &'a Chart,
+        outside: &[EventName],
+        by: Requester,
+        down: Option<NodeId>,
+    ) -> Self {
         Self {
             deployment,
             chart,
@@ -69,6 +57,7 @@ impl<'a> Reactions<'a> {
             table: FxHashMap::default(),
             offers: FxHashMap::default(),
             outside: outside.iter().map(|e| chart.event(*e)).collect(),
+            by,
             down,
         }
     }
@@ -77,10 +66,11 @@ impl<'a> Reactions<'a> {
         let is_down = from.is_some_and(|leaf| self.down.is_some_and(|down| self.chart.is_inside(leaf, down)));
         MacrostepRecorder {
             deployment: self.deployment,
+            by: self.by,
             down: self.down,
             is_down,
             taken: false,
-            batch: Vec::new(),
+            batch: Batch::default(),
             handed: Vec::new(),
             left: Vec::new(),
             emitted: Vec::new(),
@@ -156,11 +146,12 @@ pub fn triggers(chart: &Chart, leaf: NodeId) -> (Vec<EventId>, bool) {
 /// Writes down what is raised and left.
 struct MacrostepRecorder<'a> {
     deployment: &'a Deployment,
+    by: Requester,
     down: Option<NodeId>,
     is_down: bool,
     taken: bool,
-    batch: Vec<Asked>,
-    handed: Vec<Handed>,
+    batch: Batch,
+    handed: Vec<Batch>,
     left: Vec<NodeId>,
     emitted: Vec<EventName>,
 }
@@ -174,13 +165,9 @@ impl MacrostepRecorder<'_> {
 
 impl Hook for MacrostepRecorder<'_> {
     fn exited(&mut self, _: &Chart, state: NodeId) {
-        let earlier = self.handed.iter_mut().flat_map(|handed| match handed {
-            Handed::Batch(asked) => asked.as_mut_slice(),
-            Handed::Down => &mut [],
-        });
-        for asked in earlier.chain(&mut self.batch).filter(|a| a.owner == Some(state)) {
-            asked.owner = None;
-        }
+        let requests = self.handed.iter_mut().chain([&mut self.batch]).flat_map(|batch| &mut batch.requests);
+        let left = requests.filter(|request| is_left(request, self.by, &[state]));
+        left.for_each(|request| request.tag = (0, 0));
         if !self.left.contains(&state) {
             self.left.push(state);
         }
@@ -191,12 +178,13 @@ impl Hook for MacrostepRecorder<'_> {
     }
 
     fn after_step(&mut self, view: &mut HookContext<'_>) {
-        if !self.batch.is_empty() {
-            self.handed.push(Handed::Batch(std::mem::take(&mut self.batch)));
+        if !self.batch.requests.is_empty() {
+            self.handed.push(std::mem::take(&mut self.batch));
         }
         let is_down = self.down.is_some_and(|down| view.leaf.is_some_and(|leaf| view.chart.is_inside(leaf, down)));
         if is_down && !self.is_down {
-            self.handed.push(Handed::Down);
+            let down = Request { why: Why::Down, ..Request::new(RequestId(0), Ask::Undo, self.by) };
+            self.handed.push(Batch::one(down));
         }
         self.is_down = is_down;
     }
@@ -218,7 +206,8 @@ impl Hook for MacrostepRecorder<'_> {
         match ask_of(self.deployment, raised.name) {
             Some(ask) => {
                 let scope = raised.scope.and_then(|state| u32::try_from(state.index()).ok()).map(Scope);
-                self.batch.push(Asked { ask, owner: Some(raised.owner), scope });
+                let tag = (raised.owner.index() as u64 + 1, 0);
+                self.batch.requests.push(Request { scope, tag, ..Request::new(RequestId(0), ask, self.by) });
             }
             None => self.emitted.push(raised.name),
         }

@@ -247,22 +247,20 @@ impl Product<'_> {
         let mut all: Vec<Begun> = Vec::new();
         for (k, (before, next)) in way.iter().enumerate() {
             // One that is over may be followed at once by another of the same requests.
-            let known: Vec<_> = under_way(before).into_iter().filter(|batch| !answered(before, next, batch)).collect();
+            let known: Vec<_> = under_way(before).filter(|batch| !answered(before, next, batch)).collect();
             for requests in under_way(&next.state) {
-                if known.iter().any(|other| same(other, &requests)) {
+                if known.iter().any(|other| same(other, requests)) {
                     continue;
                 }
                 let gone = |(before, next): &(&ProductState, &Next)| {
-                    answered(before, next, &requests)
-                        || !under_way(&next.state).iter().any(|other| same(other, &requests))
+                    answered(before, next, requests) || !under_way(&next.state).any(|other| same(other, requests))
                 };
                 let over = way[k + 1..].iter().position(gone).map(|after| k + 1 + after);
-                let group = self.worlds.group(next.state.world, &requests, &goes(&next.state, &requests));
+                let group = self.worlds.group(next.state.world, requests, &goes(&next.state, requests));
                 let idle = group.is_some_and(|group| group.planned.is_none_or(|planned| planned.steps.is_empty()));
                 // As they are when they are answered: whoever asked may have left the state that hears it.
-                let requests = over.map_or(requests.clone(), |at| {
-                    under_way(way[at].0).into_iter().find(|other| same(other, &requests)).unwrap_or(requests.clone())
-                });
+                let told = over.and_then(|at| under_way(way[at].0).find(|other| same(other, requests)));
+                let requests = SmallVec::from_slice(told.unwrap_or(requests));
                 all.push(Begun { at: k, requests, over, idle });
             }
         }

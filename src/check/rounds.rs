@@ -8,11 +8,9 @@ use super::adjacency::Adjacency;
 use super::bound::Bound;
 use super::explore::{Edge, Graph, NOWHERE};
 use super::outcome::EMPTY;
-use super::state::{Failed, Move};
+use super::state::Failed;
 use crate::limits;
 use crate::stack::{Request, World};
-use petgraph::algo::kosaraju_scc;
-use petgraph::graph::DiGraph;
 use rustc_hash::FxHashMap;
 use std::collections::VecDeque;
 
@@ -91,13 +89,10 @@ impl Graph<'_, '_> {
     fn cyclic(&self) -> Cycles {
         let fits = |edge: &Edge| {
             // Where nothing is left, frames are forgotten: they do not pile up.
-            edge.failed <= Failed::Apply && edge.place.is_some() && self.states[edge.to as usize].world != EMPTY
+            edge.failed <= Failed::Apply && edge.place().is_some() && self.states[edge.to as usize].world != EMPTY
         };
         let all = self.edges.iter().filter(|edge| fits(edge)).map(|edge| (edge.from, edge.to));
-        let mut of = vec![NOWHERE; self.states.len()];
-        for (number, states) in (0..).zip(kosaraju_scc(&DiGraph::<(), ()>::from_edges(all))) {
-            states.into_iter().for_each(|at| of[at.index()] = number);
-        }
+        let of = Adjacency::new(self.states.len(), all).components();
         let on_one = |edge: &Edge| fits(edge) && of[edge.from as usize] == of[edge.to as usize];
         let edges = (0u32..).zip(&self.edges).filter(|(_, edge)| on_one(edge));
         let edges = Adjacency::new(self.states.len(), edges.map(|(number, edge)| (edge.from, number)));
@@ -145,7 +140,7 @@ impl Graph<'_, '_> {
         let mut requests: Vec<(Edge, Vec<Request>)> = Vec::new();
         for number in cycle {
             let edge = self.edges[*number as usize];
-            let next = self.nexts(edge.from).all.into_iter().nth(edge.place.unwrap_or(NOWHERE) as usize);
+            let next = self.nexts(edge.from).all.into_iter().nth(edge.place().unwrap_or(usize::MAX));
             let answered = next.into_iter().flat_map(|next| next.answers);
             let done = answered.filter(|(_, verdict)| verdict.is_success()).map(|(request, _)| request).collect();
             requests.push((edge, done));
@@ -185,9 +180,7 @@ impl Graph<'_, '_> {
         let number = u32::try_from(self.edges.len()).unwrap_or(NOWHERE);
         self.rounds.insert(number, cycle.to_vec());
         let shown = cycle.iter().all(|edge| self.edges[*edge as usize].shown);
-        let (place, by, barred) = (None, Move::Rounds, None);
-        let edge = Edge { from: at, to, place, by, failed: worst, quiet: false, barred, dropped: false, shown };
-        self.edges.push(edge);
+        self.rounds_lead(at, to, worst, shown);
         true
     }
 }

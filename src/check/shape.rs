@@ -8,9 +8,12 @@ use rustc_hash::{FxHashMap, FxHashSet};
 use smallvec::SmallVec;
 use std::sync::Arc;
 
-/// A frame that counts: its content, whether frames that do not count keep it from being undone, and which of its values
-/// these would take over and of its calls they keep.
-pub type Counted = (FrameNumber, bool, Vec<Slot>);
+/// A frame that counts: its content, and the number of what frames that do not count do to it.
+pub type Counted = (FrameNumber, u32);
+
+/// Whether frames that do not count keep a frame from being undone, and which of its values these would take over and of its
+/// calls they keep.
+type Beneath = (bool, Vec<Slot>);
 
 /// Which frames count.
 #[derive(Debug, Clone, Default)]
@@ -42,6 +45,9 @@ pub struct Shapes {
     pub undone: Undone,
     frames: FrameBook,
     orders: Orders,
+    beneath: FxHashMap<Beneath, u32>,
+    /// Of a frame (its content) among the frames that do not count, so many of which lie below it.
+    under: FxHashMap<(FrameNumber, SmallVec<[FrameNumber; 4]>, usize), u32>,
 }
 
 /// In which orders frames of one requester were met, by their configurations: the lower one first.
@@ -145,7 +151,7 @@ impl Orders {
 impl Shapes {
     /// Shapes in which these frames count.
     pub fn new(undone: Undone) -> Self {
-        Self { undone, frames: FrameBook::default(), orders: Orders::default() }
+        Self { undone, ..Self::default() }
     }
 
     /// The frames that count, in a canonical order.
@@ -154,24 +160,29 @@ impl Shapes {
         let counts: Vec<bool> = frames.iter().map(|frame| self.undone.counts(frame)).collect();
         self.orders.note(frames, &counts);
         let mut kept: Vec<(&Arc<Frame>, Counted)> = Vec::new();
-        let others: Vec<Arc<Frame>> =
-            frames.iter().zip(&counts).filter(|(_, counts)| !**counts).map(|(frame, _)| frame.clone()).collect();
+        let others: SmallVec<[&Arc<Frame>; 4]> =
+            frames.iter().zip(&counts).filter(|(_, counts)| !**counts).map(|(frame, _)| frame).collect();
+        let numbers: SmallVec<[FrameNumber; 4]> = others.iter().map(|frame| self.frames.number(frame)).collect();
         let mut below = 0;
         for (i, frame) in frames.iter().enumerate() {
             if !counts[i] {
                 below += 1;
                 continue;
             }
-            let above = &others[below..];
-            let over = |slot: &Slot| above.iter().any(|f| f.saved.iter().any(|s| s.slot == *slot));
-            let mut handed: Vec<Slot> = frame.saved.iter().map(|s| s.slot).filter(over).collect();
-            if calls(frame).next().is_some() {
-                handed.extend(staying(frame, &others));
-            }
-            handed.sort_unstable();
-            handed.dedup();
-            let blocked = !above.is_empty() && is_kept(frame, above.iter().cloned());
-            kept.push((frame, (self.frames.number(frame), blocked, handed)));
+            let number = self.frames.number(frame);
+            // Those below matter only to what it has called.
+            let from = if calls(frame).next().is_some() { 0 } else { below };
+            let key = (number, SmallVec::from_slice(&numbers[from..]), below - from);
+            let under = match self.under.get(&key) {
+                Some(known) => *known,
+                None => {
+                    let next = u32::try_from(self.beneath.len()).unwrap_or(u32::MAX);
+                    let under = *self.beneath.entry(beneath(frame, &others[from..], below - from)).or_insert(next);
+                    self.under.insert(key, under);
+                    under
+                }
+            };
+            kept.push((frame, (number, under)));
         }
         // Where it may come to squashing, the oldest go first. A stack that is not half full is far from that.
         let of = |by: Requester| frames.iter().filter(|frame| frame.requester == by).count();
@@ -184,10 +195,9 @@ impl Shapes {
             let mut least = 0;
             for at in 1..kept.len() {
                 let smaller = kept[at].0.configuration.as_str() < kept[least].0.configuration.as_str();
-                let passes = |below: &Arc<Frame>, frame: &Arc<Frame>, shapes: &mut Self| {
-                    !filling(below, frame) && shapes.commute(below, frame)
-                };
-                if smaller && (0..at).all(|below| passes(kept[below].0, kept[at].0, self)) {
+                let mut passes =
+                    |below: usize| !filling(kept[below].0, kept[at].0) && self.commute(&kept[below], &kept[at]);
+                if smaller && (0..at).all(&mut passes) {
                     least = at;
                 }
             }
@@ -211,12 +221,27 @@ impl Shapes {
 
     /// Whether it makes no difference which of two frames lies above the other: they share nothing, and are not undone by
     /// one name.
-    fn commute(&mut self, a: &Arc<Frame>, b: &Arc<Frame>) -> bool {
+    fn commute(&mut self, (a, one): &(&Arc<Frame>, Counted), (b, other): &(&Arc<Frame>, Counted)) -> bool {
         if self.undone.in_order {
             return false;
         }
         let one_name = a.requester == b.requester
             && (a.configuration == b.configuration || self.undone.bare.contains(&a.requester));
-        !one_name && !self.frames.share(a, b)
+        !one_name && !self.frames.share((a, one.0), (b, other.0))
     }
+}
+
+/// What frames that do not count do to one that does, above so many of them.
+fn beneath(frame: &Arc<Frame>, others: &[&Arc<Frame>], below: usize) -> Beneath {
+    let others: Vec<Arc<Frame>> = others.iter().map(|frame| (*frame).clone()).collect();
+    let above = &others[below..];
+    let over = |slot: &Slot| above.iter().any(|f| f.saved.iter().any(|s| s.slot == *slot));
+    let mut handed: Vec<Slot> = frame.saved.iter().map(|s| s.slot).filter(over).collect();
+    if calls(frame).next().is_some() {
+        handed.extend(staying(frame, &others));
+    }
+    handed.sort_unstable();
+    handed.dedup();
+    let blocked = !above.is_empty() && is_kept(frame, above.iter().cloned());
+    (blocked, handed)
 }

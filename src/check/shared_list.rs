@@ -4,12 +4,13 @@
 //! Of a hundred thousand states most differ in one or two things from the one that they come of; with the lists themselves in it
 //! a state would be a kilobyte, and copying them most of what following costs.
 
+use smallvec::SmallVec;
 use std::ops::{Deref, DerefMut};
 use std::rc::Rc;
 
 /// A list that costs nothing where it is empty, and nothing to copy.
 #[derive(Debug, PartialEq, Eq, Hash)]
-pub struct SharedList<T>(Option<Rc<Vec<T>>>);
+pub struct SharedList<T>(Option<Rc<SmallVec<[T; 1]>>>);
 
 impl<T> SharedList<T> {
     /// None.
@@ -30,7 +31,7 @@ impl<T> SharedList<T> {
 
 impl<T: Clone> SharedList<T> {
     /// Lets something change them. An empty list stands as none, so that equal ones are equal.
-    fn change<R>(&mut self, with: impl FnOnce(&mut Vec<T>) -> R) -> R {
+    fn change<R>(&mut self, with: impl FnOnce(&mut SmallVec<[T; 1]>) -> R) -> R {
         let list = Rc::make_mut(self.0.get_or_insert_default());
         let answer = with(list);
         if list.is_empty() {
@@ -52,10 +53,17 @@ impl<T: Clone> SharedList<T> {
         self.change(|list| list.remove(at))
     }
 
-    /// Only those of which this is true, asked in order and once of each. It may change them.
-    pub fn retain(&mut self, stays: impl FnMut(&mut T) -> bool) {
-        if !self.is_empty() {
-            self.change(|list| list.retain_mut(stays));
+    /// Only those of which this is true. Where it is of all, nothing is copied.
+    pub fn retain(&mut self, stays: impl Fn(&T) -> bool) {
+        if !self.iter().all(&stays) {
+            self.change(|list| list.retain(|one| stays(one)));
+        }
+    }
+
+    /// Changes those of which this is true.
+    pub fn update(&mut self, of: impl Fn(&T) -> bool, with: impl Fn(&mut T)) {
+        if self.iter().any(&of) {
+            self.iter_mut().filter(|one| of(one)).for_each(with);
         }
     }
 
@@ -65,7 +73,7 @@ impl<T: Clone> SharedList<T> {
         T: PartialEq,
     {
         if self.windows(2).any(|two| two[0] == two[1]) {
-            self.change(Vec::dedup);
+            self.change(SmallVec::dedup);
         }
     }
 }
@@ -127,33 +135,9 @@ impl<'a, T> IntoIterator for &'a SharedList<T> {
 
 impl<T: Clone> IntoIterator for SharedList<T> {
     type Item = T;
-    type IntoIter = std::vec::IntoIter<T>;
+    type IntoIter = smallvec::IntoIter<[T; 1]>;
 
     fn into_iter(self) -> Self::IntoIter {
         self.0.map(Rc::unwrap_or_clone).unwrap_or_default().into_iter()
-    }
-}
-
-/// Something larger, shared by the states that have the same until one changes it.
-#[derive(Debug, Default, PartialEq, Eq, Hash)]
-pub struct Shared<T>(Rc<T>);
-
-impl<T> Clone for Shared<T> {
-    fn clone(&self) -> Self {
-        Self(self.0.clone())
-    }
-}
-
-impl<T> Deref for Shared<T> {
-    type Target = T;
-
-    fn deref(&self) -> &T {
-        &self.0
-    }
-}
-
-impl<T: Clone> DerefMut for Shared<T> {
-    fn deref_mut(&mut self) -> &mut T {
-        Rc::make_mut(&mut self.0)
     }
 }

@@ -36,9 +36,7 @@ impl Product<'_> {
         if state.safe.is_empty() && !unknown {
             let numbers: SmallVec<[u32; 4]> = state.desk.under_way().iter().map(|active| active.number).collect();
             for number in numbers.into_iter().filter(|number| !state.is_stopped(*number)) {
-                let requests =
-                    state.desk.active(number).map(|active| active.batch.requests.clone()).unwrap_or_default();
-                if !self.comes(state, number, &requests).can_fail.contains(&true) {
+                if !self.comes(state, number).can_fail.contains(&true) {
                     idle.push(number);
                 }
             }
@@ -120,9 +118,9 @@ impl Shows {
 }
 
 /// The requests of each batch under way, and each safe configuration that is being applied.
-pub(super) fn under_way(state: &ProductState) -> Vec<SmallVec<[Request; 2]>> {
-    let batches = state.desk.under_way().iter().map(|active| active.batch.requests.clone());
-    batches.chain(state.safe.iter().map(|request| SmallVec::from_iter([*request]))).collect()
+pub(super) fn under_way(state: &ProductState) -> impl Iterator<Item = &[Request]> {
+    let batches = state.desk.under_way().iter().map(|active| &active.batch.requests[..]);
+    batches.chain(state.safe.iter().map(std::slice::from_ref))
 }
 
 /// How a batch goes that a state has under way: alone, where it takes along what stands in its way.
@@ -140,10 +138,7 @@ pub(super) fn goes_back(state: &ProductState) -> bool {
 
 /// Whether an undo came too late to give up what is still under way: it waits for it.
 pub(super) fn too_late(state: &ProductState) -> bool {
-    let waits = |undo: &Request| {
-        let of = |batch: SmallVec<[Request; 2]>| crate::stack::given_up_of(undo, &batch).is_some();
-        under_way(state).into_iter().any(of)
-    };
+    let waits = |undo: &Request| under_way(state).any(|batch| crate::stack::given_up_of(undo, batch).is_some());
     state.desk.waiting().flat_map(|batch| &batch.requests).any(waits)
 }
 
@@ -153,26 +148,26 @@ pub(super) fn races(before: &ProductState, next: &Next) -> bool {
         let of = before.desk.under_way().iter().find(|active| active.batch.requests.contains(request));
         verdict.is_success() && of.is_some_and(|active| before.is_stopped(active.number))
     };
-    let back = |requests: &SmallVec<[Request; 2]>| {
+    let back = |requests: &[Request]| {
         let waits = next.state.desk.waiting().any(|batch| same(&batch.requests, requests));
-        waits && !under_way(&next.state).iter().any(|other| same(other, requests))
+        waits && !under_way(&next.state).any(|other| same(other, requests))
     };
     // Or only some of it had begun: what is left of it begins anew.
-    let shrinks = |requests: &SmallVec<[Request; 2]>| {
-        let within = |other: &SmallVec<[Request; 2]>| {
+    let shrinks = |requests: &[Request]| {
+        let within = |other: &[Request]| {
             let known = |r: &Request| requests.iter().any(|of| (of.ask, of.requester) == (r.ask, r.requester));
             other.len() < requests.len() && other.iter().all(known)
         };
-        next.answers.is_empty() && under_way(&next.state).iter().any(within)
+        next.answers.is_empty() && under_way(&next.state).any(within)
     };
     // Or nothing of it had, and what came has cancelled it.
-    let cancelled = |requests: &SmallVec<[Request; 2]>| {
+    let cancelled = |requests: &[Request]| {
         let of = |r: &Request| requests.iter().any(|of| (of.ask, of.requester) == (r.ask, r.requester));
-        let goes_on = under_way(&next.state).iter().flatten().any(of);
+        let goes_on = under_way(&next.state).flatten().any(of);
         !goes_on && !next.answers.iter().any(|(request, _)| of(request)) && requests[0].why == Why::Asked
     };
-    let stops = |requests| back(requests) || shrinks(requests) || cancelled(requests);
-    next.answers.iter().any(through) || under_way(before).iter().any(stops)
+    let stops = |requests: &[Request]| back(requests) || shrinks(requests) || cancelled(requests);
+    next.answers.iter().any(through) || under_way(before).any(stops)
 }
 
 /// Whether a move answers all of a batch. An answer on its way is of something that has not begun, whoever asks for the same.

@@ -1,10 +1,11 @@
 //! The states of the product, and the moves between them.
 
+use super::desks::KeptDesk;
 use super::outcome::WorldId;
-use super::shared_list::{Shared, SharedList};
+use super::shared_list::SharedList;
 use crate::model::codes::{STACK_EMPTY, STACK_NO_FRAME};
 use crate::model::{Ask, ComponentName, ConfigId, Findings, Verdict};
-use crate::stack::{Batch, Desk, Request, Requester, Why};
+use crate::stack::{Batch, Request, Requester, Why};
 use crate::statechart::{EventId, NodeId};
 use smallvec::SmallVec;
 use std::rc::Rc;
@@ -51,7 +52,7 @@ pub struct ProductState {
     /// System and stack.
     pub world: WorldId,
     /// What waits and what is under way.
-    pub desk: Shared<Desk>,
+    pub desk: KeptDesk,
     /// Batches under way that are interrupted.
     pub interrupted: SharedList<Interrupted>,
     /// Batches under way that were begun as one, of which some requests were answered since.

@@ -3,7 +3,6 @@
 use super::product::Product;
 use super::shows::goes;
 use super::state::{Move, Next, ProductState, Reacts};
-use super::world::plain;
 use crate::model::{Ask, ConfigId, EventName, SimulatedReaction, StepPattern, Verdict};
 use crate::stack::Request;
 use crate::statechart::{EventId, NodeId};
@@ -215,11 +214,11 @@ impl<'a> Product<'a> {
             return Reacts::new();
         }
         let goes = goes(before, &requests);
-        let key = (before.world, plain(&requests), goes);
+        let key = (before.world, self.desks.asks(&requests), goes);
         if let Some(known) = self.reacts.get(&key) {
             return known.clone();
         }
-        let steps = self.worlds.steps(before.world, &requests, &key.2);
+        let steps = self.worlds.steps(before.world, &key.1, &key.2);
         let all = self.deployment.reactions.iter().enumerate().filter(|(_, reaction)| {
             let pattern = StepPattern::new(&reaction.after);
             steps.iter().any(|planned| pattern.matches(&planned.step))

@@ -119,6 +119,7 @@ impl Worlds<'_> {
                 return None;
             }
         }
-        Some(self.went(id, world, &[]))
+        let system = self.systems.number(&mut world.system);
+        Some(self.went(id, world, system, &[]))
     }
 }

@@ -6,7 +6,6 @@ use super::state::{Failed, Move, Next, ProductState};
 use super::trace::{Again, Happened, MoveReplay, TraceStep};
 use crate::limits;
 use crate::stack::Request;
-use smallvec::SmallVec;
 use std::collections::VecDeque;
 
 /// What happens on a way.
@@ -43,7 +42,7 @@ impl Graph<'_, '_> {
         for number in self.edges_to(at) {
             let edge = self.edges[number as usize];
             let from = self.states[edge.from as usize].clone();
-            let rounds = if edge.place.is_none() { self.rounds_of(number) } else { None };
+            let rounds = if edge.place().is_none() { self.rounds_of(number) } else { None };
             parts.push(match rounds {
                 Some((times, cycle)) => {
                     let cycle = cycle.iter().map(|number| self.gone(*number)).collect();
@@ -115,8 +114,9 @@ impl Graph<'_, '_> {
 
     /// The move that an edge is, with the state before it.
     pub(super) fn gone(&mut self, number: u32) -> (ProductState, Next) {
-        let Edge { from, to, place, .. } = self.edges[number as usize];
-        let next = place.and_then(|place| self.nexts(from).all.into_iter().nth(place as usize));
+        let edge = self.edges[number as usize];
+        let (from, to) = (edge.from, edge.to);
+        let next = edge.place().and_then(|place| self.nexts(from).all.into_iter().nth(place));
         let (before, state) = (self.states[from as usize].clone(), self.states[to as usize].clone());
         let next = next.unwrap_or_else(|| Next::plain(Move::Rounds, state.clone(), Failed::Nothing));
         (before, Next { state, ..next })
@@ -149,18 +149,15 @@ impl Graph<'_, '_> {
 
     /// The shortest ways by such edges.
     fn search(&self, counts: impl Fn(&Edge) -> bool) -> Vec<u32> {
-        let mut out: Vec<SmallVec<[u32; 4]>> = vec![SmallVec::new(); self.states.len()];
-        for (number, edge) in (0u32..).zip(&self.edges).filter(|(_, edge)| counts(edge)) {
-            out[edge.from as usize].push(number);
-        }
         let mut by = vec![NOWHERE; self.states.len()];
         let mut seen = vec![false; self.states.len()];
         let mut queue: VecDeque<u32> = VecDeque::from([0]);
         seen[0] = true;
         while let Some(at) = queue.pop_front() {
-            for number in &out[at as usize] {
-                let to = self.edges[*number as usize].to;
-                if !std::mem::replace(&mut seen[to as usize], true) {
+            for number in self.outgoing().of(at) {
+                let edge = &self.edges[*number as usize];
+                let to = edge.to;
+                if counts(edge) && !std::mem::replace(&mut seen[to as usize], true) {
                     by[to as usize] = *number;
                     queue.push_back(to);
                 }

@@ -7,9 +7,10 @@
 //!
 //! After *broken* nothing is known any more: that is a world of its own ([`Top`]).
 
-use super::equivalence::{hash_system, same_system};
+use super::desks::PlainBatch;
 use super::outcome::{Comes, ConcurrentWork, Held, SafeComes, Went, Whose, WorldId};
 use super::shape::{Counted, Shapes, Undone};
+use super::systems::{SystemId, Systems};
 use crate::limits;
 use crate::model::{Ask, Catalogue, ConfigId, Configuration, Deployment, RequestId};
 use crate::plan::{PlanContext, Refusal, plan};
@@ -40,6 +41,13 @@ enum Knowledge {
 
 struct Exact {
     world: World,
+    system: SystemId,
+    /// A safe configuration is in force.
+    safe: bool,
+    /// There is an actuator.
+    actuator: bool,
+    /// Frames have been squashed.
+    piled_up: bool,
     counted: Vec<Counted>,
     /// The numbers of the counted frames.
     ids: Vec<FrameId>,
@@ -58,20 +66,14 @@ pub struct Worlds<'a> {
     confirms: bool,
     worlds: Vec<Knowledge>,
     index: FxHashMap<u64, SmallVec<[WorldId; 1]>>,
-    /// The first world with each system.
-    systems: FxHashMap<u64, SmallVec<[WorldId; 1]>>,
-    pub(super) comes: FxHashMap<(WorldId, SmallVec<[Request; 2]>, ConcurrentWork), Rc<Comes>>,
+    pub(super) systems: Systems,
+    pub(super) comes: FxHashMap<(WorldId, PlainBatch, ConcurrentWork), Rc<Comes>>,
     safes: FxHashMap<(WorldId, Request, Held), Rc<SafeComes>>,
-    pub(super) helds: FxHashMap<(WorldId, SmallVec<[Request; 2]>, ConcurrentWork), Held>,
+    pub(super) helds: FxHashMap<(WorldId, PlainBatch, ConcurrentWork), Held>,
     pub(super) withouts: FxHashMap<(WorldId, SmallVec<[Whose; 2]>), Option<Went>>,
     pub(super) asked: FxHashSet<ConfigId>,
     /// Configurations of which it can be told whether what they stand for is true.
     pub(super) judged: FxHashSet<ConfigId>,
-}
-
-/// Requests without what means nothing to what they come to.
-pub(super) fn plain(requests: &[Request]) -> SmallVec<[Request; 2]> {
-    requests.iter().map(|request| Request { tag: (0, 0), ..*request }).collect()
 }
 
 /// The context in which a deployment's configurations are planned.
@@ -92,7 +94,7 @@ impl<'a> Worlds<'a> {
             confirms: deployment.configurations.iter().any(|c| c.confirm.is_some()),
             worlds: Vec::new(),
             index: FxHashMap::default(),
-            systems: FxHashMap::default(),
+            systems: Systems::default(),
             comes: FxHashMap::default(),
             safes: FxHashMap::default(),
             helds: FxHashMap::default(),
@@ -110,7 +112,7 @@ impl<'a> Worlds<'a> {
         }
         let given = system.len();
         let world = World::new(system, Stack::remembering(deployment.limits.stack));
-        worlds.intern(World { given, ..world });
+        worlds.met(World { given, ..world });
         worlds
     }
 
@@ -156,7 +158,7 @@ impl<'a> Worlds<'a> {
     /// Whether a safe configuration is in force.
     pub fn is_safe(&self, id: WorldId) -> bool {
         match &self.worlds[id as usize] {
-            Knowledge::Exact(exact) => exact.world.stack.safe().next().is_some(),
+            Knowledge::Exact(exact) => exact.safe,
             Knowledge::Top(top) => top.safe,
         }
     }
@@ -164,12 +166,21 @@ impl<'a> Worlds<'a> {
     /// Whether there is, or may be, an actuator.
     pub fn has_actuator(&self, id: WorldId) -> bool {
         match &self.worlds[id as usize] {
-            Knowledge::Exact(exact) => {
-                let mut some = false;
-                exact.world.system.for_each_component(&mut |node| some |= node.ty.actuator);
-                some
-            }
+            Knowledge::Exact(exact) => exact.actuator,
             Knowledge::Top(top) => top.actuator,
+        }
+    }
+
+    /// Whether frames have been squashed.
+    pub fn is_piled_up(&self, id: WorldId) -> bool {
+        matches!(&self.worlds[id as usize], Knowledge::Exact(exact) if exact.piled_up)
+    }
+
+    /// The number of the system of a world that is known.
+    pub(super) fn system(&self, id: WorldId) -> SystemId {
+        match &self.worlds[id as usize] {
+            Knowledge::Exact(exact) => exact.system,
+            Knowledge::Top(_) => SystemId::MAX,
         }
     }
 
@@ -206,13 +217,13 @@ impl<'a> Worlds<'a> {
         let BestEffort { planned, frame, troubles } =
             effort(&before.system, &before.stack, configuration, request, Time::default(), &self.context);
         let mut world = before.clone();
-        planned.steps.iter().for_each(|planned| step::effect(&planned.step, &mut world.system));
+        let system = self.systems.carry_out(self.system(id), &mut world.system, &planned.steps);
         let edits = planned.parts[0].edits.clone();
         let how = SafeEnd { left_out: !troubles.is_empty(), ..SafeEnd::default() };
         let (pushed, verdict) = world.settle_safe(edits, frame, &how, held);
         let may_fail = !planned.steps.is_empty();
         let troubles = Rc::new(troubles.iter().flat_map(Reason::findings).collect());
-        let comes = SafeComes { done: self.went(id, world, &[pushed]), verdict, troubles, may_fail };
+        let comes = SafeComes { done: self.went(id, world, system, &[pushed]), verdict, troubles, may_fail };
         let comes = Rc::new(comes);
         self.safes.insert(key, comes.clone());
         comes
@@ -221,7 +232,8 @@ impl<'a> Worlds<'a> {
     /// The world after a coordinator has come to its *down* state, and all are down.
     pub fn settle_down(&mut self, id: WorldId) -> Option<WorldId> {
         let mut world = self.get(id)?.clone();
-        world.settle_down().then(|| self.intern(world))
+        let system = self.system(id);
+        world.settle_down().then(|| self.intern(world, system))
     }
 
     /// Whether a frame of this configuration by this requester counts.
@@ -249,8 +261,9 @@ impl<'a> Worlds<'a> {
     }
 
     /// The number of a world of the caller's own.
-    pub fn met(&mut self, world: World) -> WorldId {
-        self.intern(world)
+    pub fn met(&mut self, mut world: World) -> WorldId {
+        let system = self.systems.number(&mut world.system);
+        self.intern(world, system)
     }
 
     /// Configurations that were asked for in some world.
@@ -319,10 +332,11 @@ impl<'a> Worlds<'a> {
         WorldId::try_from(self.worlds.len()).unwrap_or(WorldId::MAX)
     }
 
-    pub(super) fn went(&mut self, from: WorldId, world: World, pushed: &[FrameId]) -> Went {
+    /// Where it leads that a world has become another one, whose system has that number.
+    pub(super) fn went(&mut self, from: WorldId, world: World, system: SystemId, pushed: &[FrameId]) -> Went {
         let [deep, left] = self.more_than([limits::CHECK_FRAMES, limits::CHECK_LEFT], &world);
         if !self.confirms {
-            return Went { world: self.intern(world), places: None, pushed: SmallVec::new(), deep, left };
+            return Went { world: self.intern(world, system), places: None, pushed: SmallVec::new(), deep, left };
         }
         let (counted, ids) = self.shapes.of(&world.stack);
         let place = |id: &FrameId| ids.iter().position(|other| other == id).and_then(|at| u8::try_from(at).ok());
@@ -330,7 +344,7 @@ impl<'a> Worlds<'a> {
         let places = before.iter().map(place).collect();
         let of = |id: &FrameId| world.stack.frame(*id).map(|frame| frame.configuration);
         let pushed = pushed.iter().filter_map(|id| Some((of(id)?, place(id)?))).collect();
-        let world = self.intern_shaped(world, counted, ids);
+        let world = self.intern_shaped(world, system, counted, ids);
         Went { world, places: Some(Rc::new(places)), pushed, deep, left }
     }
 
@@ -359,39 +373,32 @@ impl<'a> Worlds<'a> {
         deep
     }
 
-    fn intern(&mut self, world: World) -> WorldId {
+    fn intern(&mut self, world: World, system: SystemId) -> WorldId {
         let (counted, ids) = self.shapes.of(&world.stack);
-        self.intern_shaped(world, counted, ids)
+        self.intern_shaped(world, system, counted, ids)
     }
 
-    fn intern_shaped(&mut self, mut world: World, counted: Vec<Counted>, ids: Vec<FrameId>) -> WorldId {
+    fn intern_shaped(&mut self, world: World, system: SystemId, counted: Vec<Counted>, ids: Vec<FrameId>) -> WorldId {
         let mut hasher = FxHasher::default();
-        hash_system(&world.system, &mut hasher);
-        let of_system = hasher.finish();
-        counted.hash(&mut hasher);
-        let hash = hasher.finish();
+        (system, &counted).hash(&mut hasher);
         let same = |id: &&WorldId| match &self.worlds[**id as usize] {
             Knowledge::Exact(exact) => {
                 let same = exact.counted == counted && (!self.shapes.undone.in_order || exact.ids == ids);
-                same && same_system(&exact.world.system, &world.system)
+                same && exact.system == system
             }
             Knowledge::Top(_) => false,
         };
+        let hash = hasher.finish();
         if let Some(id) = self.index.get(&hash).and_then(|ids| ids.iter().find(same)) {
             return *id;
         }
         let id = self.next();
-        // Most worlds differ in their frames only.
-        let like = self.systems.entry(of_system).or_default();
-        let known = |id: &&WorldId| match &self.worlds[**id as usize] {
-            Knowledge::Exact(exact) => same_system(&exact.world.system, &world.system),
-            Knowledge::Top(_) => false,
-        };
-        match like.iter().find(known).map(|id| &self.worlds[*id as usize]) {
-            Some(Knowledge::Exact(exact)) => world.system.share_with(&exact.world.system),
-            _ => like.push(id),
-        }
-        self.worlds.push(Knowledge::Exact(Box::new(Exact { world, counted, ids })));
+        let safe = world.stack.safe().next().is_some();
+        let piled_up = world.stack.frames().iter().any(|frame| frame.is_squashed());
+        let mut actuator = false;
+        world.system.for_each_component(&mut |node| actuator |= node.ty.actuator);
+        let exact = Exact { world, system, safe, actuator, piled_up, counted, ids };
+        self.worlds.push(Knowledge::Exact(Box::new(exact)));
         self.index.entry(hash).or_default().push(id);
         id
     }

@@ -255,6 +255,14 @@ impl Desk {
         under_way.chain(self.waiting.iter_mut().flat_map(|batch| &mut batch.requests))
     }
 
+    /// The same, as they are.
+    pub fn requests(&self) -> impl Iterator<Item = &Request> {
+        let under_way = self.under_way.iter().flat_map(|active| {
+            active.batch.requests.iter().chain(active.given_up.iter().map(|given_up| &given_up.undo))
+        });
+        under_way.chain(self.waiting.iter().flat_map(|batch| &batch.requests))
+    }
+
     /// The request at a place of a batch under way is answered so (none: nobody is told).
     pub fn answered(&mut self, number: u32, place: usize, verdict: Option<Verdict>) -> Gone {
         let mut gone = Gone { over: true, ..Gone::default() };

@@ -3,6 +3,7 @@
 use crate::model::{Ask, ComponentName, OPERATOR, RequestId};
 use smallvec::SmallVec;
 use std::fmt;
+use std::hash::{Hash, Hasher};
 
 /// Who asked for a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -51,7 +52,7 @@ pub enum Why {
 }
 
 /// One request.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Request {
     /// Its number, given by who asks.
     pub id: RequestId,
@@ -73,6 +74,13 @@ pub struct Request {
     pub why: Why,
     /// Comes back with the answer; means nothing to the configurator.
     pub tag: (u64, u64),
+}
+
+impl Hash for Request {
+    fn hash<H: Hasher>(&self, hasher: &mut H) {
+        // By what differs between those that are met.
+        (self.ask, self.requester, self.scope, self.tag.0, self.still).hash(hasher);
+    }
 }
 
 impl Request {
