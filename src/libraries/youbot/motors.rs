@@ -78,7 +78,7 @@ mod tests {
         let mut encoders = Encoders::default();
         let count = std::f64::consts::TAU / (156.0 * 4000.0);
         encoders.read(&J5::repeat(0.0), 0.001);
-        let read = encoders.read(&J5::repeat(1.4 * count), 0.001);
+        let read = encoders.read(&J5::repeat(1.05 * count), 0.001);
         assert!((read.q[0] - count).abs() < 1e-12 && (read.qd[0] - count / 0.001).abs() < 1e-9, "{read:?}");
         assert_eq!((read.q[3], read.qd[3]), (0.0, 0.0), "half a count of a coarser one");
     }

@@ -92,3 +92,37 @@ impl Tank {
         force
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const DT: f64 = 0.001;
+
+    /// Five seconds of a force of 5 N that always pushes along a motion of 0.1 m/s: what it does to the tool, in J.
+    fn pushed_along(tank: &mut Tank, heard: impl Fn(usize) -> Option<f64>) -> f64 {
+        let (velocity, mut position, mut work) = (Vector3::new(0.1, 0.0, 0.0), Vector3::zeros(), 0.0);
+        for tick in 0..5000 {
+            let force = tank.update(&Vector3::new(5.0, 0.0, 0.0), &position, &velocity, heard(tick), DT);
+            position += velocity * DT;
+            work += force.dot(&velocity) * DT;
+        }
+        work
+    }
+
+    #[test]
+    fn what_pushes_along_ends_when_the_tank_is_empty() {
+        // Shared with the other end meanwhile: less than was in it.
+        let mut tank = Tank::with(0.02);
+        let work = pushed_along(&mut tank, |_| None);
+        assert!(work < 0.02 && tank.level() > -1e-4, "{work} J, {} J left", tank.level());
+    }
+
+    #[test]
+    fn what_is_told_again_counts_once() {
+        let told = |tick: usize| Some(if tick < 100 { 0.0 } else { 0.05 });
+        let (mut with, mut without) = (Tank::with(0.0), Tank::with(0.0));
+        let gained = pushed_along(&mut with, told) - pushed_along(&mut without, |_| None);
+        assert!(gained > 0.01 && gained < 0.06, "{gained} J");
+    }
+}
