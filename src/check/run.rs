@@ -64,7 +64,9 @@ fn run_one(shared: Arc<Deployment>, catalogue: &Catalogue, effort: Effort<'_>) -
         findings.extend(simulated::events(deployment, &charts));
         findings.extend(unwatched::check(deployment, &universe, &charts));
         findings.extend(interface::check(deployment, &universe, &charts));
-        findings.extend(interface::between(deployment, &charts, catalogue));
+        if deployment.own.is_none() {
+            findings.extend(interface::between(deployment, &charts, catalogue));
+        }
         let of = |number| coupling::view(deployment, &charts, number);
         let views: Vec<Deployment> = (0..all).filter_map(of).collect();
         let told: BTreeSet<EventName> = charts

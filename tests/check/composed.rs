@@ -374,6 +374,7 @@ fn what_is_accepted_file_by_file_is_refused_by_no_product() {
         let apart = check::run(deployment.clone(), &types);
         let effort = Effort { together: true, transitions: 30_000, ..Effort::default() };
         let product = check::run_with(deployment, &types, effort);
+        assert!(product.explored.states > 100, "{seed}: {:#?}", product.findings);
         let violated = |f: &&Finding| {
             f.severity == Severity::Error
                 && ["coord::request_refused", "conf::still_connected", "conf::unknown_component"].contains(&f.code.0)
