@@ -35,6 +35,9 @@ return state {
   -- The links are taken apart before either robot leaves.
   parting = state { entry = "join.undo" },
 
+  -- They could not be: nothing is taken away under them. `e_shutdown` tries again.
+  tied = state {},
+
   lowering = state { entry = { "left/e_shutdown", "right/e_shutdown" },
     going = both("down"),
     trans { src = "initial", tgt = "going" },
@@ -43,6 +46,8 @@ return state {
   trans { src = "initial", tgt = "idle" },
   trans { src = "idle",    tgt = "alive",    events = { "e_start" } },
   trans { src = "alive",   tgt = "parting",  events = { "e_shutdown" } },
-  trans { src = "parting", tgt = "lowering", events = { "join.undone", "join.undo.failed", "join.undo.broken" } },
+  trans { src = "parting", tgt = "lowering", events = { "join.undone" } },
+  trans { src = "parting", tgt = "tied",     events = { "join.undo.failed", "join.undo.broken" } },
+  trans { src = "tied",    tgt = "parting",  events = { "e_shutdown" } },
   trans { src = "lowering.going.both", tgt = "idle", events = { "e_done" } },
 }

@@ -103,7 +103,12 @@ fn one_coordinator_drives_two_platforms() {
 
 #[test]
 fn the_examples_stories_run_as_scripts() {
-    for story in ["examples/youbot_story.lua", "examples/side_by_side/story.lua"] {
+    for story in [
+        "examples/youbot_story.lua",
+        "examples/side_by_side/story.lua",
+        "examples/pair/story.lua",
+        "examples/coupling_story.lua",
+    ] {
         runs(story);
     }
 }
