@@ -2,7 +2,7 @@
 
 use super::base::{Pose2, Twist2};
 use super::parameters::{BASE_LAG, BASE_MOUNT, COULOMB, JOINTS, RANGE_LOWER_DEG, RANGE_UPPER_DEG, VISCOUS};
-use super::rigid_body::{ArmModel, BaseMotion, J5, M5, Posture, radians};
+use super::rigid_body::{ArmModel, BaseMotion, J5, M5, radians};
 use nalgebra::{Rotation3, Vector3};
 
 /// Stiffness of the mechanical stops, in N m/rad (assumed: stiff, and slow enough for a step of 0.5 ms).
@@ -90,7 +90,8 @@ impl ArmPlant {
     }
 
     /// Where it is.
-    pub fn posture(&self) -> Posture {
+    #[cfg(test)]
+    pub fn posture(&self) -> super::rigid_body::Posture {
         self.model.posture(&self.q)
     }
 }
