@@ -46,7 +46,7 @@ fn configurations(seed: u64, before: &str) -> String {
         _ = write!(text, "connect(\"{before}C{from}.a\", \"{before}C{to}.b\"{policy}), ");
     }
     let first = chance.below(components);
-    _ = write!(text, "post_conf_state = {{ \"{before}C{first}:stopped\", \"_default:stopped\" }} }},\n");
+    _ = writeln!(text, "post_conf_state = {{ \"{before}C{first}:stopped\", \"_default:stopped\" }} }},");
     _ = writeln!(text, "{} {{ post_conf_state = {{ \"_default:running\" }} }},", id("run"));
     let (one, value) = (chance.below(components), chance.below(9));
     _ = writeln!(
