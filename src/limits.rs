@@ -456,8 +456,9 @@ pub const SAMPLES_WAKES: u32 = 1_000_000;
 /// in no inbox.
 pub const OFFERED: usize = 1024;
 
-/// Subsystems of one deployment, in each other or beside each other: a fleet, and what a list of them still shows.
-pub const SUBSYSTEMS: usize = 256;
+/// Subsystems of one deployment, in each other or beside each other: of no more it is known, where coordinators are followed, how each stands
+/// (`check/children.rs` keeps that in one word of a state), and what is not followed must not be called sound.
+pub const SUBSYSTEMS: usize = 20;
 
 /// Subsystems in each other: a cell with robots with arms with grippers is four.
 pub const SUBSYSTEM_DEPTH: usize = 8;

@@ -270,6 +270,11 @@ fn files_that_do_not_fit_each_other_are_told() {
     assert!(found(&circle).iter().any(|finding| finding.code.0 == "compose::circle"));
     let platform = [("pair.yaml", "platform: simulated", "platform: embedded")];
     assert!(found(&platform).iter().any(|finding| finding.code.0 == "compose::differs"), "{:#?}", found(&platform));
+    // Of more it would not be known how they stand, and that must not be called sound.
+    let more: String =
+        (0..davit::limits::SUBSYSTEMS).map(|at| format!("  s{at}: {{ deployment: arm.yaml }}\n")).collect();
+    let many = found(&[("pair.yaml", "subsystems:\n", &format!("subsystems:\n{more}"))]);
+    assert!(many.iter().any(|finding| finding.code.0 == "text::too_large"), "{many:#?}");
     let word = [("arm.yaml", "emits: [e_built, e_leaving]", "emits: [e_built, e_leaving, up]")];
     assert!(found(&word).iter().any(|finding| finding.code.0 == "compose::word"));
     let said = one(&[("pair.lua", "'left/e_leaving'", "'left/e_laeving'")], "compose::unknown");
