@@ -81,7 +81,7 @@ impl CoordinatorHandle {
         let mut thread = lock(&coordinator.shared.thread);
         let shared = coordinator.shared.clone();
         thread.join = Some(clock.spawn(name, move || shared.run(listener, open)));
-        thread.id = thread.join.as_ref().map(|join| join.thread().id());
+        thread.id = thread.join.as_ref().and_then(|join| join.thread()).map(std::thread::Thread::id);
         drop(thread);
         coordinator
     }

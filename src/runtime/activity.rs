@@ -1,4 +1,4 @@
-//! Activities: the threads that update components.
+//! Activities: what updates components, in a thread each, or as a task of the simulated clock.
 //!
 //! An activity shares with the configurator atomic words, a signal, a queue of operations and the latest list of its
 //! components, and no lock.
@@ -10,7 +10,7 @@ use super::latest::Reader;
 use crate::limits;
 use crate::model::monitor::Counter;
 use crate::model::{Activity as Spec, ActivityStatus, ComponentName, Ident, RunState};
-use crate::time::{Clock, Receiver, Signal, Time};
+use crate::time::{Clock, Next, Receiver, Signal, Time};
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
@@ -57,6 +57,28 @@ pub(crate) struct ActivityThread {
     counters: Counters,
     complaint: Mutex<Option<String>>,
     late: LateCall,
+}
+
+/// What an activity keeps from one step to the next.
+pub(crate) struct Rounds {
+    schedule: Reader<Schedule>,
+    requests: Receiver<OperationJob>,
+    /// Operations that wait until their component has come to rest.
+    held: VecDeque<OperationJob>,
+    /// When the next round is due.
+    release: Time,
+    begun: bool,
+    /// Nothing ran the last time it looked.
+    idle: bool,
+    /// Rounds in succession in which something was updated, of an event-driven activity.
+    restless: u32,
+}
+
+impl Rounds {
+    pub(crate) fn new(schedule: Reader<Schedule>, requests: Receiver<OperationJob>) -> Self {
+        let held = VecDeque::new();
+        Self { schedule, requests, held, release: Time::default(), begun: false, idle: true, restless: 0 }
+    }
 }
 
 impl ActivityThread {
@@ -143,84 +165,81 @@ impl ActivityThread {
         word.load(Ordering::Relaxed) as f64 * unit
     }
 
-    /// The thread.
-    pub(crate) fn run(&self, mut schedule: Reader<Schedule>, requests: &Receiver<OperationJob>) {
-        if !self.clock.is_simulated() {
-            *crate::time::lock(&self.complaint) = super::realtime::apply(self.spec.priority, self.spec.cpu);
+    /// Serves what is asked; while nothing runs, or when it is to end, answers what to wait for.
+    fn attend(&self, rounds: &mut Rounds) -> Option<Next> {
+        self.parked.store(false, Ordering::SeqCst);
+        if self.ended.load(Ordering::SeqCst) {
+            return Some(Next::End);
+        }
+        self.take_up(&mut rounds.held);
+        while let Ok(request) = rounds.requests.try_recv() {
+            self.admit(request, &mut rounds.held);
+        }
+        if self.running.load(Ordering::SeqCst) > 0 {
+            return None;
+        }
+        rounds.idle = true;
+        self.parked.store(true, Ordering::SeqCst);
+        // Whoever starts a component sees the mark, or is seen here.
+        (self.running.load(Ordering::SeqCst) == 0).then_some(Next::Wait(Time::NEVER))
+    }
+
+    /// What it does when it is its turn: what is asked, and a round when one is due.
+    pub(crate) fn step(&self, rounds: &mut Rounds) -> Next {
+        if !rounds.begun {
+            rounds.begun = true;
+            rounds.release = self.clock.now();
+            if !self.clock.is_simulated() {
+                *crate::time::lock(&self.complaint) = super::realtime::apply(self.spec.priority, self.spec.cpu);
+            }
         }
         match self.spec.period {
-            Some(period) => self.run_periodic(period.max(limits::SHORTEST_PERIOD), &mut schedule, requests),
-            None => self.run_on_events(&mut schedule, requests),
+            Some(period) => self.step_periodic(period.max(limits::SHORTEST_PERIOD), rounds),
+            None => self.step_on_events(rounds),
         }
     }
 
-    /// Serves what is asked, and waits while nothing runs. False: the thread is to end.
-    fn attend(&self, requests: &Receiver<OperationJob>, held: &mut VecDeque<OperationJob>) -> bool {
-        loop {
-            if self.ended.load(Ordering::SeqCst) {
-                return false;
-            }
-            self.take_up(held);
-            while let Ok(request) = requests.try_recv() {
-                self.admit(request, held);
-            }
-            if self.running.load(Ordering::SeqCst) > 0 {
-                return true;
-            }
-            self.parked.store(true, Ordering::SeqCst);
-            if self.running.load(Ordering::SeqCst) == 0 {
-                self.signal.wait(Time::NEVER);
-            }
-            self.parked.store(false, Ordering::SeqCst);
-        }
-    }
-
-    fn run_periodic(&self, period: Duration, schedule: &mut Reader<Schedule>, requests: &Receiver<OperationJob>) {
+    fn step_periodic(&self, period: Duration, rounds: &mut Rounds) -> Next {
         let step = u64::try_from(period.as_nanos()).unwrap_or(u64::MAX);
-        let mut release = self.clock.now();
-        let mut held = VecDeque::new();
         loop {
-            let idle = self.running.load(Ordering::SeqCst) == 0;
-            if !self.attend(requests, &mut held) {
-                return;
+            if let Some(next) = self.attend(rounds) {
+                return next;
             }
             let now = self.clock.now();
-            if idle {
-                release = release.max(now);
+            if std::mem::take(&mut rounds.idle) {
+                rounds.release = rounds.release.max(now);
             }
+            let release = rounds.release;
             if now < release {
-                self.signal.wait(release);
-                continue;
+                return Next::Wait(release);
             }
             let late = now.since(release);
             self.counters.latency_last.store(nanos(late), Ordering::Relaxed);
             self.counters.latency_max.fetch_max(nanos(late), Ordering::Relaxed);
-            self.round(now, schedule, |cell| {
+            self.round(now, &mut rounds.schedule, |cell| {
                 if let Some(inside) = CellGuard::running(cell) {
                     self.update(cell, inside, now, release, period.as_secs_f64());
                 }
             });
-            release = Time(release.0.saturating_add(step));
+            rounds.release = Time(release.0.saturating_add(step));
             let now = self.clock.now();
-            if now > release {
+            if now > rounds.release {
                 // The releases that are past are missed; the phase is kept.
-                let missed = (now.0 - release.0).div_ceil(step);
+                let missed = (now.0 - rounds.release.0).div_ceil(step);
                 self.counters.overruns.fetch_add(missed, Ordering::Relaxed);
-                release = Time(release.0.saturating_add(missed.saturating_mul(step)));
+                rounds.release = Time(rounds.release.0.saturating_add(missed.saturating_mul(step)));
             }
         }
     }
 
-    fn run_on_events(&self, schedule: &mut Reader<Schedule>, requests: &Receiver<OperationJob>) {
-        let mut restless = 0;
-        let mut held = VecDeque::new();
+    fn step_on_events(&self, rounds: &mut Rounds) -> Next {
         loop {
-            if !self.attend(requests, &mut held) {
-                return;
+            if let Some(next) = self.attend(rounds) {
+                return next;
             }
             let now = self.clock.now();
             let (mut any, mut next) = (false, Time::NEVER);
-            self.round(now, schedule, |cell| {
+            self.round(now, &mut rounds.schedule, |cell| {
                 let wake_at = Time(cell.beat.wake_at.load(Ordering::Relaxed));
                 let pending = cell.beat.pending.load(Ordering::Acquire);
                 if !pending && wake_at > now {
@@ -237,16 +256,16 @@ impl ActivityThread {
                 }
             });
             if !any {
-                restless = 0;
-                self.signal.wait(next);
-            } else if restless < limits::EVENT_ROUNDS {
-                restless += 1;
-            } else {
-                // A loop of components that wake each other would hold simulated time still and a CPU busy for ever.
-                restless = 0;
-                self.counters.overruns.fetch_add(1, Ordering::Relaxed);
-                self.clock.sleep(limits::EVENT_PAUSE);
+                rounds.restless = 0;
+                return Next::Wait(next);
             }
+            if rounds.restless >= limits::EVENT_ROUNDS {
+                // A loop of components that wake each other would hold simulated time still and a CPU busy for ever.
+                rounds.restless = 0;
+                self.counters.overruns.fetch_add(1, Ordering::Relaxed);
+                return Next::Pause(self.clock.now() + limits::EVENT_PAUSE);
+            }
+            rounds.restless += 1;
         }
     }
 

@@ -198,7 +198,7 @@ impl Clock {
             drop(done);
         });
         match thread {
-            Ok(thread) => Ok(Join { ended, thread }),
+            Ok(thread) => Ok(Join { ended, thread: Some(thread) }),
             Err(error) => {
                 if let (TimeKind::Simulated(scheduler), Some(id)) = (&*self.0, id) {
                     scheduler.withdraw(id);
@@ -253,7 +253,8 @@ impl Drop for Guard {
 #[derive(Debug)]
 pub struct Join {
     ended: Receiver<Result<(), JoinError>>,
-    thread: JoinHandle<()>,
+    /// None: a task, which has no thread of its own.
+    thread: Option<JoinHandle<()>>,
 }
 
 /// How a thread did not simply end.
@@ -271,7 +272,7 @@ pub enum JoinError {
 }
 
 impl JoinError {
-    fn of(payload: &(dyn Any + Send)) -> Self {
+    pub(super) fn of(payload: &(dyn Any + Send)) -> Self {
         if payload.is::<Released>() { Self::Released } else { Self::Panicked(panic_text(payload)) }
     }
 }
@@ -290,6 +291,10 @@ pub fn panic_text(payload: &(dyn Any + Send)) -> String {
 }
 
 impl Join {
+    pub(super) fn of_task(ended: Receiver<Result<(), JoinError>>) -> Self {
+        Self { ended, thread: None }
+    }
+
     /// Waits until the thread has ended, at most until `deadline`.
     ///
     /// # Errors
@@ -298,7 +303,9 @@ impl Join {
         match self.ended.recv_deadline(deadline) {
             Ok(outcome) => {
                 // What is left of it needs no token: it is only taken off the operating system's list.
-                let _ = self.thread.join();
+                if let Some(thread) = self.thread {
+                    let _ = thread.join();
+                }
                 outcome
             }
             Err(RecvError::Timeout) => Err(JoinError::Timeout),
@@ -308,11 +315,11 @@ impl Join {
 
     /// Whether the thread has ended (or is just about to).
     pub fn is_finished(&self) -> bool {
-        !self.ended.is_empty() || self.thread.is_finished()
+        !self.ended.is_empty() || self.thread.as_ref().is_some_and(JoinHandle::is_finished)
     }
 
-    /// The thread, for what the operating system may be asked about it.
-    pub fn thread(&self) -> &std::thread::Thread {
-        self.thread.thread()
+    /// The thread, for what the operating system may be asked about it; none: a task on a simulated clock.
+    pub fn thread(&self) -> Option<&std::thread::Thread> {
+        self.thread.as_ref().map(JoinHandle::thread)
     }
 }

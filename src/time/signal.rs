@@ -4,7 +4,7 @@
 //! one: the waiting thread is parked, and un-parking it is one atomic exchange (and a system call when it sleeps).
 
 use super::clock::{Clock, TimeKind};
-use super::simulated::WaitUntil;
+use super::turns::WaitUntil;
 use super::{Time, lock};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, OnceLock};
@@ -86,6 +86,22 @@ impl Signal {
                 }
             }),
         }
+    }
+
+    /// What [`Self::wait`] does before it gives the token away, for who waits without a thread: false when there is nothing
+    /// to wait for, else `begin` has told how the wait is ended.
+    pub(super) fn begin_wait(&self, deadline: Time, begin: impl FnOnce() -> WaitUntil) -> bool {
+        let mut wait = lock(&self.inner.wait);
+        if self.inner.set.swap(false, Ordering::SeqCst) || self.clock.now() >= deadline {
+            return false;
+        }
+        *wait = Some(begin());
+        true
+    }
+
+    /// What [`Self::wait`] does when the wait has ended.
+    pub(super) fn clear(&self) {
+        self.inner.set.store(false, Ordering::SeqCst);
     }
 
     /// Whether the flag is set.

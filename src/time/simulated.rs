@@ -1,70 +1,31 @@
 //! The scheduler of simulated time: one token, handed round in a fixed order.
 //!
-//! One mutex guards everything; every participant waits on a condition variable of its own, so that a hand-over wakes
-//! exactly one thread. Locks are taken in the order *channel, then scheduler*, never the reverse.
+//! One mutex guards everything; every participant waits for a turn of its own, so that a hand-over wakes exactly one thread,
+//! and wakes it when the mutex is free again. Tasks ([`super::tasks`]) are participants without a thread of their own. Locks
+//! are taken in the order *channel or signal, then scheduler*, never the reverse.
 
+use super::turns::{Called, Id, SchedulerState, WaitUntil};
 use super::{Time, lock};
-use rustc_hash::FxHashMap;
 use std::cell::RefCell;
 use std::cmp::Reverse;
-use std::collections::{BinaryHeap, VecDeque};
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Condvar, Mutex, MutexGuard};
 use std::time::{Duration, Instant};
-
-/// A participant. Numbers only grow, so they are also the order among those who wait for the same moment.
-type Id = u64;
-
-/// One wait of one participant; a later wait of the same participant has another number.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct WaitUntil {
-    id: Id,
-    number: u64,
-}
-
-impl WaitUntil {
-    pub(super) fn is_of(self, id: u64) -> bool {
-        self.id == id
-    }
-}
 
 /// The scheduler of one simulated clock.
 pub(super) struct Scheduler {
     /// Which clock it is, in the thread-local list of memberships.
     clock: u64,
     pace: Option<Pace>,
-    now: AtomicU64,
-    state: Mutex<SchedulerState>,
+    pub(super) now: AtomicU64,
+    pub(super) state: Mutex<SchedulerState>,
+    /// Where threads that run tasks wait for one.
+    pub(super) runners: Condvar,
 }
 
 struct Pace {
     factor: f64,
     start: Instant,
-}
-
-#[derive(Default)]
-struct SchedulerState {
-    next_id: Id,
-    next_wait: u64,
-    participants: FxHashMap<Id, Participant>,
-    /// Who holds the token. Nobody: all wait for a moment that pacing has not reached, or for the outside.
-    running: Option<Id>,
-    ready: VecDeque<Id>,
-    /// Moments waited for; entries of waits that have ended otherwise stay until they come up.
-    timers: BinaryHeap<Reverse<(Time, Id, u64)>>,
-    /// Moments for which alone time does not move on; at most one of each participant, and of few.
-    idle: Vec<(Time, Id, u64)>,
-    hung: Vec<WaitUntil>,
-    shut: bool,
-    /// Who watches real time, when paced.
-    pacer: Option<Id>,
-    hand_overs: u64,
-}
-
-struct Participant {
-    turn: Arc<Condvar>,
-    /// The wait it is in; none: ready or running.
-    wait: Option<u64>,
 }
 
 thread_local! {
@@ -81,7 +42,13 @@ impl Scheduler {
             pace: factor.map(|factor| Pace { factor, start: Instant::now() }),
             now: AtomicU64::new(0),
             state: Mutex::new(SchedulerState::default()),
+            runners: Condvar::new(),
         }
+    }
+
+    /// Whether time follows real time.
+    pub(super) fn is_paced(&self) -> bool {
+        self.pace.is_some()
     }
 
     pub(super) fn now(&self) -> Time {
@@ -107,7 +74,7 @@ impl Scheduler {
         self.catch_up(&state);
         let id = state.add();
         state.ready.push_back(id);
-        self.dispatch(&mut state, None);
+        self.dispatch_and_call(state);
         id
     }
 
@@ -118,15 +85,23 @@ impl Scheduler {
         state.ready.retain(|ready| *ready != id);
         if state.running == Some(id) {
             state.running = None;
-            self.dispatch(&mut state, None);
+            self.dispatch_and_call(state);
         }
     }
 
     /// The calling thread is participant `id` from now on; waits for its turn.
     pub(super) fn begin(&self, id: Id) {
+        self.be(id);
+        self.wait_for_turn(lock(&self.state), id, Called::Nobody);
+    }
+
+    /// The calling thread speaks for participant `id`, until it is [nobody](Self::be_nobody).
+    pub(super) fn be(&self, id: Id) {
         MEMBER.with_borrow_mut(|list| list.push((self.clock, id)));
-        let state = lock(&self.state);
-        drop(self.wait_for_turn(state, id));
+    }
+
+    pub(super) fn be_nobody(&self, id: Id) {
+        MEMBER.with_borrow_mut(|list| list.retain(|member| *member != (self.clock, id)));
     }
 
     /// Makes the calling thread a participant; false when it was one.
@@ -142,11 +117,11 @@ impl Scheduler {
     /// The calling thread is no participant any more.
     pub(super) fn leave(&self) {
         let Some(id) = self.me() else { return };
-        MEMBER.with_borrow_mut(|list| list.retain(|member| *member != (self.clock, id)));
+        self.be_nobody(id);
         let mut state = lock(&self.state);
         state.participants.remove(&id);
         state.running = None;
-        self.dispatch(&mut state, None);
+        self.dispatch_and_call(state);
     }
 
     /// Runs `f` as a participant: with the number the thread has, or one for this call.
@@ -200,12 +175,12 @@ impl Scheduler {
         for wait in std::mem::take(&mut state.hung) {
             state.make_ready(wait);
         }
-        self.dispatch(&mut state, None);
+        self.dispatch_and_call(state);
     }
 
     /// Says that the participant waits from now on; it may be made ready by [`Scheduler::wake`] from here, and must
     /// call [`Scheduler::wait`] with the same lock or after it.
-    fn begin_wait(&self, state: &mut SchedulerState, me: Id, deadline: Time) -> WaitUntil {
+    pub(super) fn begin_wait(&self, state: &mut SchedulerState, me: Id, deadline: Time) -> WaitUntil {
         let number = state.next_wait;
         state.next_wait += 1;
         if let Some(participant) = state.participants.get_mut(&me) {
@@ -240,54 +215,73 @@ impl Scheduler {
         let mut state = lock(&self.state);
         self.catch_up(&state);
         let woken = state.make_ready(wait);
-        self.dispatch(&mut state, None);
+        self.dispatch_and_call(state);
         woken
     }
 
     /// Gives the token away and waits for the next turn.
-    fn block(&self, mut state: MutexGuard<'_, SchedulerState>, me: Id) {
+    fn block<'a>(&'a self, mut state: MutexGuard<'a, SchedulerState>, me: Id) {
         state.running = None;
-        self.dispatch(&mut state, Some(me));
-        drop(self.wait_for_turn(state, me));
+        let called = self.dispatch(&mut state, Some(me));
+        self.wait_for_turn(state, me, called);
     }
 
-    fn wait_for_turn<'a>(
-        &'a self,
-        mut state: MutexGuard<'a, SchedulerState>,
-        me: Id,
-    ) -> MutexGuard<'a, SchedulerState> {
-        let Some(turn) = state.participants.get(&me).map(|p| p.turn.clone()) else { return state };
+    /// Waits until `me` has the token; `called` is woken first.
+    fn wait_for_turn<'a>(&'a self, mut state: MutexGuard<'a, SchedulerState>, me: Id, mut called: Called) {
+        let Some(turn) = state.participants.get(&me).map(|p| p.turn.clone()) else { return };
         while state.running != Some(me) {
             let pacing = state.pacer == Some(me) && state.running.is_none();
-            match (&self.pace, pacing.then(|| state.next_timer()).flatten()) {
-                (Some(pace), Some((at, _))) => {
-                    let left = pace.until(at);
-                    if !left.is_zero() {
-                        state = turn.wait_timeout(state, left).unwrap_or_else(PoisonError::into_inner).0;
-                    }
-                    self.dispatch(&mut state, Some(me));
-                }
-                _ => state = turn.wait(state).unwrap_or_else(PoisonError::into_inner),
+            let watched = match (&self.pace, pacing.then(|| state.next_timer()).flatten()) {
+                (Some(pace), Some((at, _))) => Some(pace.until(at)),
+                _ => None,
+            };
+            drop(state);
+            self.call(std::mem::replace(&mut called, Called::Nobody));
+            if watched.is_none_or(|left| !left.is_zero()) {
+                turn.wait(watched);
+            }
+            state = lock(&self.state);
+            if watched.is_some() {
+                called = self.dispatch(&mut state, Some(me));
             }
         }
-        state
+        drop(state);
+        self.call(called);
     }
 
-    /// Gives the token, if nobody has it, to whoever is next. `blocked`: the caller, if it waits from now on.
-    fn dispatch(&self, state: &mut SchedulerState, blocked: Option<Id>) {
+    pub(super) fn call(&self, called: Called) {
+        match called {
+            Called::Nobody => {}
+            Called::Thread(turn) => turn.call(),
+            Called::Runner => self.runners.notify_one(),
+        }
+    }
+
+    /// [`Self::dispatch`] by who does not wait itself.
+    pub(super) fn dispatch_and_call(&self, mut state: MutexGuard<'_, SchedulerState>) {
+        let called = self.dispatch(&mut state, None);
+        drop(state);
+        self.call(called);
+    }
+
+    /// Gives the token, if nobody has it, to whoever is next, who is to be [called](Self::call) afterwards. `blocked`: the
+    /// caller, if it waits from now on; it looks by itself.
+    pub(super) fn dispatch(&self, state: &mut SchedulerState, blocked: Option<Id>) -> Called {
         while state.running.is_none() {
             if let Some(id) = state.ready.pop_front() {
-                if let Some(participant) = state.participants.get(&id) {
-                    participant.turn.notify_one();
-                    state.running = Some(id);
-                    state.hand_overs += 1;
+                let Some(participant) = state.participants.get(&id) else { continue };
+                state.running = Some(id);
+                state.hand_overs += 1;
+                if participant.task.is_some() {
+                    state.due = Some(id);
+                    return Called::Runner;
                 }
-                continue;
+                return if blocked == Some(id) { Called::Nobody } else { Called::Thread(participant.turn.clone()) };
             }
-            let Some((at, _)) = state.next_timer() else { return };
+            let Some((at, _)) = state.next_timer() else { return Called::Nobody };
             // A clock that follows real time goes on anyway.
             if self.pace.is_none() && state.is_idle() {
-                return;
+                return Called::Nobody;
             }
             if let Some(pace) = &self.pace
                 && !pace.until(at).is_zero()
@@ -297,10 +291,10 @@ impl Scheduler {
                 if state.pacer != watcher || blocked.is_none() {
                     state.pacer = watcher;
                     if let Some(participant) = watcher.and_then(|id| state.participants.get(&id)) {
-                        participant.turn.notify_one();
+                        return Called::Thread(participant.turn.clone());
                     }
                 }
-                return;
+                return Called::Nobody;
             }
             self.now.fetch_max(at.0, Ordering::AcqRel);
             while let Some((next, _)) = state.next_timer()
@@ -310,6 +304,7 @@ impl Scheduler {
                 state.make_ready(wait);
             }
         }
+        Called::Nobody
     }
 
     /// When paced and everybody waits, lets simulated time follow real time up to the next moment somebody waits for:
@@ -337,64 +332,5 @@ impl Pace {
     fn until(&self, at: Time) -> Duration {
         let real = (at.as_secs_f64() / self.factor - self.start.elapsed().as_secs_f64()).min(3600.0);
         if real > 0.0 { Duration::from_secs_f64(real) } else { Duration::ZERO }
-    }
-}
-
-impl SchedulerState {
-    fn add(&mut self) -> Id {
-        let id = self.next_id;
-        self.next_id += 1;
-        self.participants.insert(id, Participant { turn: Arc::new(Condvar::new()), wait: None });
-        id
-    }
-
-    fn make_ready(&mut self, wait: WaitUntil) -> bool {
-        match self.participants.get_mut(&wait.id) {
-            Some(participant) if participant.wait == Some(wait.number) => {
-                participant.wait = None;
-                self.ready.push_back(wait.id);
-                true
-            }
-            _ => false,
-        }
-    }
-
-    /// The earliest moment somebody waits for, and who.
-    fn next_timer(&mut self) -> Option<(Time, Id)> {
-        let (eager, idle) = (self.next_eager(), self.next_idle());
-        eager.into_iter().chain(idle).min().map(|(at, id, _)| (at, id))
-    }
-
-    /// Takes it.
-    fn pop_timer(&mut self) -> Option<WaitUntil> {
-        let (eager, idle) = (self.next_eager(), self.next_idle());
-        let first = eager.into_iter().chain(idle).min()?;
-        if idle == Some(first) {
-            self.idle.retain(|timer| *timer != first);
-        } else {
-            self.timers.pop();
-        }
-        Some(WaitUntil { id: first.1, number: first.2 })
-    }
-
-    /// Whether nobody waits for a moment for which time moves on.
-    fn is_idle(&mut self) -> bool {
-        self.next_eager().is_none()
-    }
-
-    fn next_eager(&mut self) -> Option<(Time, Id, u64)> {
-        while let Some(Reverse((at, id, number))) = self.timers.peek().copied() {
-            if self.participants.get(&id).is_some_and(|p| p.wait == Some(number)) {
-                return Some((at, id, number));
-            }
-            self.timers.pop();
-        }
-        None
-    }
-
-    fn next_idle(&mut self) -> Option<(Time, Id, u64)> {
-        let Self { participants, idle, .. } = self;
-        idle.retain(|(_, id, number)| participants.get(id).is_some_and(|p| p.wait == Some(*number)));
-        idle.iter().min().copied()
     }
 }

@@ -288,3 +288,116 @@ fn idle_waits_do_not_move_time_on_and_end_when_it_goes_on() {
     clock.sleep(MS * 24);
     assert_eq!(*lock(&woken), [at(10), at(20), at(30)]);
 }
+
+/// Tasks of several periods, one that its signal wakes and one that sleeps in the middle of a step, beside a thread: everything
+/// they do, in order.
+fn trace_of_tasks(clock: &Clock, tasks: bool) -> Vec<String> {
+    let trace = Arc::new(Mutex::new(Vec::new()));
+    let guard = clock.enter();
+    let mut joins = Vec::new();
+    let spawn = |name: &str, signal: &Signal, mut step: Box<dyn FnMut() -> Next + Send>| {
+        if tasks {
+            clock.try_spawn_task(name, signal, step).unwrap()
+        } else {
+            let (clock, signal) = (clock.clone(), signal.clone());
+            clock.clone().spawn(name, move || {
+                loop {
+                    match step() {
+                        Next::Wait(deadline) => drop(signal.wait(deadline)),
+                        Next::Pause(until) => clock.sleep_until(until),
+                        Next::End => return,
+                    }
+                }
+            })
+        }
+    };
+    let woken = clock.signal();
+    for (name, period, sleeps) in [("a", 2, 0), ("b", 3, 2), ("c", 6, 7), ("d", 2, 0)] {
+        let (own, trace, other, signal) = (clock.clone(), trace.clone(), woken.clone(), clock.signal());
+        let (mut i, mut next) = (0, clock.now());
+        let step = move || {
+            if own.now() < next {
+                return Next::Wait(next);
+            }
+            i += 1;
+            lock(&trace).push(format!("{} {name}{i}", own.now()));
+            if i % 5 == 0 {
+                other.notify();
+            }
+            own.sleep(MS * sleeps);
+            next += MS * period;
+            if i == 40 { Next::End } else { Next::Pause(next) }
+        };
+        joins.push(spawn(name, &signal, Box::new(step)));
+    }
+    let (own, to) = (clock.clone(), trace.clone());
+    let step = move || {
+        lock(&to).push(format!("{} woken", own.now()));
+        if own.now() >= at(90) { Next::End } else { Next::Wait(own.now() + MS * 25) }
+    };
+    joins.push(spawn("woken", &woken, Box::new(step)));
+    let (own, to) = (clock.clone(), trace.clone());
+    joins.push(clock.spawn("thread", move || {
+        for i in 1..=30 {
+            own.sleep_until(at(i * 4));
+            lock(&to).push(format!("{} thread{i}", own.now()));
+        }
+    }));
+    for join in joins {
+        join.join(Time::NEVER).unwrap();
+    }
+    drop(guard);
+    let trace = std::mem::take(&mut *lock(&trace));
+    trace
+}
+
+#[test]
+fn tasks_are_run_in_the_order_of_threads() {
+    let threads = trace_of_tasks(&Clock::simulated(), false);
+    assert!(threads.len() > 200);
+    for _ in 0..20 {
+        assert_eq!(trace_of_tasks(&Clock::simulated(), true), threads);
+    }
+    assert_eq!(trace_of_tasks(&Clock::simulated_paced(10_000.0), true), threads);
+}
+
+#[test]
+fn a_task_that_waits_in_the_middle_holds_up_nobody() {
+    let clock = Clock::simulated();
+    let guard = clock.enter();
+    let own = clock.clone();
+    let hung = clock.try_spawn_task("hung", &clock.signal(), move || own.hang()).unwrap();
+    let steps = Arc::new(AtomicU64::new(0));
+    let (own, count) = (clock.clone(), steps.clone());
+    let step = move || match count.fetch_add(1, Ordering::SeqCst) {
+        9 => Next::End,
+        _ => Next::Pause(own.now() + MS),
+    };
+    let other = clock.try_spawn_task("other", &clock.signal(), step).unwrap();
+    assert_eq!(other.join(Time::NEVER), Ok(()));
+    assert_eq!((steps.load(Ordering::SeqCst), clock.now(), hung.is_finished()), (10, at(9), false));
+    let bad = clock.try_spawn_task("bad", &clock.signal(), || std::panic::resume_unwind(Box::new("on purpose")));
+    assert_eq!(bad.unwrap().join(Time::NEVER), Err(JoinError::Panicked("on purpose".into())));
+    clock.shutdown();
+    assert_eq!(hung.join(Time::NEVER), Err(JoinError::Released));
+    drop(guard);
+}
+
+#[test]
+fn tasks_are_woken_from_outside() {
+    let clock = Clock::simulated();
+    let signal = clock.signal();
+    let (back, answers) = clock.channel::<u64>(1_000);
+    let mut n = 0;
+    let step = move || {
+        n += 1;
+        back.try_send(n).unwrap();
+        if n == 500 { Next::End } else { Next::Wait(Time::NEVER) }
+    };
+    let task = clock.try_spawn_task("task", &signal, step).unwrap();
+    for n in 1..=500 {
+        assert_eq!(answers.recv(), Ok(n));
+        signal.notify();
+    }
+    task.join(Time::NEVER).unwrap();
+}

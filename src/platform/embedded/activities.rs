@@ -5,7 +5,7 @@ use super::registry::Registry;
 use crate::limits;
 use crate::model::{ComponentName, Ident};
 use crate::platform::Cause;
-use crate::runtime::activity::{ActivityThread, OperationJob, Schedule};
+use crate::runtime::activity::{ActivityThread, OperationJob, Rounds, Schedule};
 use crate::runtime::cell::Cell;
 use crate::runtime::latest::{Reader, Writer, latest};
 use crate::time::{Clock, Join, Receiver, Sender};
@@ -80,7 +80,9 @@ impl Registry {
             && let Some((reader, inbox)) = scheduled.waiting.take()
         {
             let activity = scheduled.activity.clone();
-            let thread = clock.try_spawn(&format!("davit-{name}"), move || activity.run(reader, &inbox));
+            let (signal, mut rounds) = (activity.signal.clone(), Rounds::new(reader, inbox));
+            let step = move || activity.step(&mut rounds);
+            let thread = clock.try_spawn_task(&format!("davit-{name}"), &signal, step);
             scheduled.thread =
                 Some(thread.map_err(|error| Cause::Refused(format!("no thread for `{name}`: {error}")))?);
         }
