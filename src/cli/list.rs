@@ -1,7 +1,9 @@
 //! `davit list`: the deployments of this user, one line each.
 
 use super::exit::Exit;
+use super::inside::level;
 use super::kept::{self, Died};
+use super::levels::{parts, states};
 use super::output::{Output, Style, Table};
 use super::remote::ASK;
 use super::status::{state_style, text};
@@ -15,6 +17,8 @@ use serde_json::{Value as Json, json};
 use std::collections::BTreeSet;
 
 /// List the running deployments of this user, and those that died without being shut down.
+///
+/// Each with the states of its coordinators, of several with their names, and how its subsystems stand.
 ///
 /// One that died, or whose record is damaged, is listed until its name is deployed again, or until it is forgotten.
 #[derive(Debug, clap::Args)]
@@ -91,12 +95,16 @@ impl Overview {
         let mut table = Table::new(0);
         for one in &self.running {
             let phase = one["phase"].as_str().unwrap_or("no answer");
-            let states = one["coordinator"].as_array().into_iter().flatten().map(text).collect::<Vec<_>>().join(", ");
+            let parts = parts(one);
+            let subsystems = parts.iter().filter(|part| level(part.path) == 1);
+            let subsystems = subsystems.map(|it| format!("{} {}", it.path, out.paint(state_style(it.standing), it.standing)));
+            let states = parts.first().map_or_else(String::new, states);
             let faults = one["faults"].as_u64().filter(|faults| *faults > 0);
             table.row([
                 out.paint(Style::Bold, text(&one["name"])),
                 out.paint(state_style(phase), phase),
                 if one["why"].is_null() { out.paint(Style::Name, states) } else { text(&one["why"]).to_owned() },
+                subsystems.collect::<Vec<_>>().join(", "),
                 faults.map_or_else(String::new, |faults| out.paint(Style::Bad, count(faults, "fault"))),
                 one["pid"].as_u64().map_or_else(String::new, |pid| format!("process {pid}")),
                 one["began"].as_str().map_or_else(String::new, |began| out.paint(Style::Dim, format!("since {began}"))),
@@ -136,10 +144,15 @@ fn about(name: &str) -> Json {
             let leaves = status["coordinators"].as_object().into_iter().flatten();
             let leaves = leaves.filter_map(|(_, states)| states.as_array()?.last().cloned());
             let length = |key: &str| status[key].as_array().map_or(0, Vec::len);
-            json!({
+            let mut one = json!({
                 "name": name, "phase": status["phase"], "coordinator": leaves.collect::<Vec<_>>(), "at": status["at"],
+                "coordinators": status["coordinators"],
                 "frames": length("stack"), "faults": length("faults"), "residual": length("residual"),
-            })
+            });
+            if status["subsystems"].is_array() {
+                one["subsystems"] = status["subsystems"].clone();
+            }
+            one
         }
     };
     // Of a process that could not keep anything, or keeps it elsewhere, this is not known.

@@ -1,9 +1,11 @@
 //! `davit log`
 
 use super::exit::Exit;
+use super::inside::Hierarchy;
 use super::kept;
 use super::output::{Output, Style};
-use super::remote::{ASK, ask, failure};
+use super::remote::{ASK, connect, failure};
+use super::sieve::Sieve;
 use super::status::text;
 use super::{CommandContext, CommandFailure, CommandResult, Run, output};
 use crate::model::codes::{CLI_NO_ANSWER, CLI_NOT_RUNNING};
@@ -16,11 +18,16 @@ use serde_json::{Value as Json, json};
 
 /// Show what happened: requests and their answers, events, states, faults, and how long each step took; of a deployment in the
 /// background also what its components printed. Of one that does not run any more what was kept of it.
+///
+/// With `--in`, what belongs to that subsystem, what others have done to it, and what is of the whole deployment; with `--depth`, of
+/// deeper subsystems only what goes wrong and what they and their parents tell each other.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The running deployment's name; not needed while only one runs.
     #[arg(value_parser = super::remote::deployment_name)]
     name: Option<String>,
+    #[command(flatten)]
+    hierarchy: Hierarchy,
     /// Only so many of the newest entries.
     #[arg(long, value_name = "N")]
     last: Option<usize>,
@@ -47,38 +54,56 @@ impl Args {
         if self.follow {
             return self.follow(context);
         }
-        let asked = Client::connect(self.name.as_deref())
-            .and_then(|mut client| client.call("log", &json!({ "last": self.last }), ASK));
-        let log = match asked {
-            Ok(log) => log,
+        let asked = Client::connect(self.name.as_deref()).and_then(|mut client| {
+            let log = client.call("log", &json!({ "last": self.at_most() }), ASK)?;
+            Ok((log.as_array().cloned().unwrap_or_default(), self.status(&mut client)?))
+        });
+        let entries = match asked {
+            Ok((log, status)) => {
+                Sieve::new(&self.hierarchy, status.as_ref(), &log)?.newest(&log, self.last)
+            }
             Err(error) => self.kept(context, error)?,
         };
         if self.json {
-            context.out.json(&log);
+            context.out.json(&entries);
             return Ok(Exit::Done);
         }
-        for entry in log.as_array().into_iter().flatten() {
+        for entry in &entries {
             context.out.text(line(&context.out, entry, self.steps));
         }
         Ok(Exit::Done)
     }
 
+    /// How many entries are asked for: all, where only some of them are shown.
+    fn at_most(&self) -> Option<usize> {
+        self.last.filter(|_| !self.is_sifted())
+    }
+
+    fn is_sifted(&self) -> bool {
+        self.hierarchy.inside.is_some() || self.hierarchy.depth.is_some()
+    }
+
+    /// The status, which is only needed to know the subsystems.
+    fn status(&self, client: &mut Client) -> Result<Option<Json>, ClientError> {
+        self.is_sifted().then(|| client.call("status", &json!({}), ASK)).transpose()
+    }
+
     /// What was kept of one that could not be asked since it does not run any more.
-    fn kept(&self, context: &CommandContext, error: ClientError) -> Result<Json, CommandFailure> {
+    fn kept(&self, context: &CommandContext, error: ClientError) -> Result<Vec<Json>, CommandFailure> {
         let life = kept::meant(&error).ok_or_else(|| failure(error))?;
-        let mut entries = entries(&life.name).map_err(|why| {
+        let entries = entries(&life.name).map_err(|why| {
             CommandFailure::no(
                 CLI_NOT_RUNNING,
                 format!("`{}` does not run, and its log cannot be read: {why}", life.name),
                 "`davit list` shows what runs",
             )
         })?;
-        entries.drain(..entries.len().saturating_sub(self.last.unwrap_or(usize::MAX)));
+        let entries = Sieve::new(&self.hierarchy, None, &entries)?.newest(&entries, self.last);
         context.out.error(match life.is_open() {
             true => format!("note: {}\n", kept::ended(&life)),
             false => format!("note: `{}` does not run any more\n", life.name),
         });
-        Ok(Json::Array(entries))
+        Ok(entries)
     }
 
     /// Whether it prints one object a line.
@@ -98,22 +123,27 @@ impl Args {
             Ok(client) => client,
             Err(error) => {
                 let kept = self.kept(context, error)?;
-                kept.as_array().into_iter().flatten().for_each(|entry| self.print(context, entry));
+                kept.iter().for_each(|entry| self.print(context, entry));
                 return Ok(Exit::Done);
             }
         };
         let name = client.name().to_owned();
         client.subscribe(ASK).map_err(failure)?;
         // Asked for behind the subscription: what happens in between is in both.
-        let log = ask(Some(&name), "log", &json!({ "last": self.last }), ASK)?;
+        let mut asking = connect(Some(&name))?;
+        let log = asking.call("log", &json!({ "last": self.at_most() }), ASK).map_err(failure)?;
         let told = log.as_array().cloned().unwrap_or_default();
+        let sieve = Sieve::new(&self.hierarchy, self.status(&mut asking).map_err(failure)?.as_ref(), &told)?;
+        drop(asking);
         let print = |entry: &Json| self.print(context, entry);
-        told.iter().for_each(&print);
+        sieve.newest(&told, self.last).iter().for_each(print);
         let mut overlap = Overlap(told);
         let mut phases = Phases::default();
         while let Some(entry) = client.next_entry() {
             phases.see(&entry);
-            if overlap.is_news(&entry) {
+            if overlap.is_news(&entry)
+                && let Some(entry) = sieve.pass(&entry)
+            {
                 print(&entry);
             }
             if output::arrives_nowhere() {

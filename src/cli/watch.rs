@@ -4,12 +4,15 @@
 //! to the deployment.
 
 use super::exit::Exit;
+use super::inside::{Hierarchy, level};
 use super::kept;
+use super::levels::{FilePart, each, folded, leaf, parts, states};
 use super::list::silent;
 use super::log::duration;
 use super::output::{self, Output, Style, Table};
 use super::remote::{connect, failure, seconds};
 use super::status::{not_known, state_style, text};
+use super::status_view::{heading, held_by, indented, title};
 use super::{CommandContext, CommandResult, Run};
 use crate::model::finding::count;
 use crate::session::client::{Client, ClientError};
@@ -29,13 +32,15 @@ const ANSWERS: Duration = Duration::from_secs(2);
 /// they are from changing) and activities.
 ///
 /// On a terminal it is drawn anew again and again; elsewhere it is a line a look, with `--json` one object a line. A look that is not
-/// answered within 2 s says so, and it goes on when the deployment answers again. Ctrl-C ends it, and so does the end of the
-/// deployment. Exit status: 0; 1 the deployment did not answer at the end; 4 it died.
+/// answered within 2 s says so, and it goes on when the deployment answers again. What is a subsystem's stands below its path, as
+/// `davit status` has it. Ctrl-C ends it, and so does the end of the deployment. Exit status: 0; 1 the deployment did not answer at the end; 4 it died.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The running deployment's name; not needed while only one runs.
     #[arg(value_parser = super::remote::deployment_name)]
     name: Option<String>,
+    #[command(flatten)]
+    hierarchy: Hierarchy,
     /// How often to look, in seconds.
     #[arg(long, value_name = "SECONDS", default_value_t = 0.5, value_parser = pause)]
     every: f64,
@@ -80,13 +85,16 @@ impl Args {
             let answers = look.is_some();
             if let Some(look) = look {
                 heard = clock.now();
+                let region = self.hierarchy.inside.in_status(&look["status"])?;
+                let look = region.map_or(look.clone(), |region| region.look(&look));
+                let depth = self.hierarchy.depth;
                 match &screen {
                     _ if self.json => out.json_line(&look),
                     Some(screen) => {
-                        page = drawn(out, &look);
+                        page = drawn(out, &look, depth);
                         screen.draw(page.clone());
                     }
-                    None => out.line(line(out, &look)),
+                    None => out.line(line(out, &look, depth)),
                 }
             } else {
                 let why = format!("does not answer for {:.0} s", clock.now().since(heard).as_secs_f64());
@@ -183,11 +191,19 @@ impl Drop for WatchScreen {
     }
 }
 
-/// The innermost active states of all coordinators.
-fn leaves(status: &Json) -> String {
-    let all = status["coordinators"].as_object().into_iter().flatten();
-    let leaf = |(_, states): (&String, &Json)| Some(states.as_array()?.last()?.as_str()?.to_owned());
-    all.filter_map(leaf).collect::<Vec<_>>().join(", ")
+/// The innermost active states of all coordinators, with their names where there are several; of a subsystem that is folded how it
+/// stands.
+fn leaves(out: &Output, status: &Json, depth: Option<usize>) -> String {
+    let mut said = Vec::new();
+    for part in &parts(status) {
+        match level(part.path).saturating_sub(depth.unwrap_or(usize::MAX)) {
+            0 if part.path.is_empty() => said.push(out.paint(Style::Name, states(part))),
+            0 => said.extend(part.coordinators.iter().map(|(name, it)| format!("{name}:{}", out.paint(Style::Name, leaf(it))))),
+            1 => said.push(format!("{} {}", part.path, out.paint(state_style(part.standing), part.standing))),
+            _ => {}
+        }
+    }
+    said.join(", ")
 }
 
 fn verdict(out: &Output, monitor: &Json) -> String {
@@ -204,7 +220,7 @@ fn margin(monitor: &Json) -> String {
 }
 
 /// A look in one line.
-fn line(out: &Output, look: &Json) -> String {
+fn line(out: &Output, look: &Json, depth: Option<usize>) -> String {
     let status = &look["status"];
     let phase = text(&status["phase"]);
     let frames = status["stack"]
@@ -213,7 +229,7 @@ fn line(out: &Output, look: &Json) -> String {
     let mut parts = vec![
         format!("{:>12.3} s", status["at"].as_f64().unwrap_or_default()),
         out.paint(state_style(phase), phase),
-        out.paint(Style::Name, leaves(status)),
+        leaves(out, status, depth),
         frames,
     ];
     let monitors = look["monitors"].as_array().into_iter().flatten();
@@ -228,46 +244,22 @@ fn line(out: &Output, look: &Json) -> String {
 }
 
 /// A look as a page.
-fn drawn(out: &Output, look: &Json) -> String {
+fn drawn(out: &Output, look: &Json, depth: Option<usize>) -> String {
     let status = &look["status"];
     let list = |key: &str| look[key].as_array().cloned().unwrap_or_default();
-    let phase = text(&status["phase"]);
-    let mut page = format!(
-        "{}  {}  {:.3} s\ncoordinator  {}\n",
-        out.paint(Style::Bold, text(&status["name"])),
-        out.paint(state_style(phase), phase),
-        status["at"].as_f64().unwrap_or_default(),
-        out.paint(Style::Name, leaves(status)),
+    let parts = parts(status);
+    let monitors = list("monitors");
+    let mut page = title(out, status) + "\n";
+    each(
+        &parts,
+        depth,
+        &mut page,
+        |part| {
+            let own = own(out, status, part, &monitors);
+            if part.path.is_empty() { own } else { format!("{}\n{}", heading(out, part), indented(&own)) }
+        },
+        |lines| folded(out, &parts, lines, !status["stack"].is_null()).to_string(),
     );
-    let waiting: Vec<&str> = status["outstanding"].as_array().into_iter().flatten().map(text).collect();
-    if !waiting.is_empty() {
-        page += &format!("waiting for  {}\n", waiting.join(", "));
-    }
-    let frames: Vec<String> =
-        status["stack"].as_array().into_iter().flatten().map(|frame| framed(out, frame)).collect();
-    let stack = match frames.is_empty() {
-        _ if status["stack"].is_null() => out.paint(Style::Bad, not_known()),
-        true => "empty".to_owned(),
-        false => frames.join(", "),
-    };
-    page += &format!("stack        {stack}\n");
-    for fault in status["faults"].as_array().into_iter().flatten() {
-        let word = out.paint(Style::Bad, "fault");
-        page += &format!("{word}        {}: {}\n", text(&fault["component"]), text(&fault["reason"]));
-    }
-    let mut components = Table::new(2);
-    for (name, component) in status["system"]["components"].as_object().into_iter().flatten() {
-        let state = text(&component["state"]);
-        components.row([
-            out.paint(state_style(state), state),
-            name.clone(),
-            out.paint(Style::Dim, text(&component["type"])),
-        ]);
-    }
-    let mut monitors = Table::new(2);
-    for monitor in list("monitors") {
-        monitors.row([verdict(out, &monitor), text(&monitor["name"]).to_owned(), margin(&monitor)]);
-    }
     let mut activities = Table::new(2);
     for activity in list("activities") {
         let us = |key: &str| duration(activity[key].as_f64().unwrap_or_default() * 1e6);
@@ -280,12 +272,54 @@ fn drawn(out: &Output, look: &Json) -> String {
             format!("takes {} (at most {})", us("duration_last_s"), us("duration_max_s")),
         ]);
     }
-    for (title, table) in [("components", components), ("monitors", monitors), ("activities", activities)] {
-        if !table.is_empty() {
-            page += &format!("{}\n{table}", out.paint(Style::Bold, title));
-        }
-    }
+    titled(out, &mut page, "activities", &activities);
     page.trim_end().to_owned()
+}
+
+fn titled(out: &Output, page: &mut String, title: &str, table: &Table) {
+    if !table.is_empty() {
+        *page += &format!("{}\n{table}", out.paint(Style::Bold, title));
+    }
+}
+
+/// What of a look is of one file.
+fn own(out: &Output, status: &Json, part: &FilePart<'_>, monitors: &[Json]) -> String {
+    let states = out.paint(Style::Name, states(part));
+    let mut page = format!("coordinator  {states}\n");
+    if !part.waiting.is_empty() {
+        page += &format!("waiting for  {}\n", part.waiting.join(", "));
+    }
+    let frames: Vec<String> = part.frames.iter().map(|frame| framed(out, frame)).collect();
+    let stack = match frames.is_empty() {
+        _ if status["stack"].is_null() => out.paint(Style::Bad, not_known()),
+        true => "empty".to_owned(),
+        false => frames.join(", "),
+    };
+    page += &format!("stack        {stack}\n");
+    if part.path.is_empty() {
+        held_by(out, status).iter().for_each(|line| page += &format!("{line}\n"));
+    }
+    for fault in &part.faults {
+        let word = out.paint(Style::Bad, "fault");
+        page += &format!("{word}        {}: {}\n", text(&fault["component"]), text(&fault["reason"]));
+    }
+    let mut components = Table::new(2);
+    for (name, component) in &part.components {
+        let state = text(&component["state"]);
+        components.row([
+            out.paint(state_style(state), state),
+            (*name).to_owned(),
+            out.paint(Style::Dim, text(&component["type"])),
+        ]);
+    }
+    titled(out, &mut page, "components", &components);
+    let mut watched = Table::new(2);
+    let its = |name: &str| part.components.iter().any(|(own, _)| *own == name);
+    for monitor in monitors.iter().filter(|monitor| its(text(&monitor["component"]))) {
+        watched.row([verdict(out, monitor), text(&monitor["name"]).to_owned(), margin(monitor)]);
+    }
+    titled(out, &mut page, "monitors", &watched);
+    page
 }
 
 /// A frame, with what is wrong with it.

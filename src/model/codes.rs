@@ -770,6 +770,10 @@ codes! {
          (`/proc/self/status`). Here it does not tell. Bound the number of transitions instead (`--budget 2M`).";
     CLI_WHICH_COORDINATOR = "cli::which_coordinator", "it is not said which coordinator is meant",
         "The deployment has several coordinators (`coordinators:`), and the command works on one. Give its name with `--of NAME`.";
+    CLI_UNKNOWN_SUBSYSTEM = "cli::unknown_subsystem", "there is no subsystem of that path",
+        "`--in PATH` looks into one subsystem of a deployment. The path is made of the names under `subsystems:`, from the deployment \
+         that is shown: `left`, or `cell/left` of one in a subsystem; a deployment without `subsystems:` has none. `davit status` and \
+         `davit graph FILE` show them all.";
     CLI_WHICH_WAY = "cli::which_way", "it is not said how to recover",
         "`davit recover` leads a broken deployment out, and there are two ways: `--back` undoes what remains, to the system \
          before the interrupted application; `--accept` takes what is there as the state and gives the stack up. Which is \

@@ -273,6 +273,24 @@ pub struct FrameStatus {
     pub lost: bool,
     /// Whether the platform does not show what its configuration stands for: it counts as true while nothing is faulted.
     pub unseen: bool,
+    /// The path of the subsystem whose configuration it is; none: the deployment's own.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub subsystem: Option<String>,
+    /// The paths of other subsystems that have components which its configuration names.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub touches: Vec<String>,
+}
+
+/// A subsystem at one moment.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SubsystemStatus {
+    /// Its path.
+    pub name: String,
+    /// What its parent was told of it last: `up`, `failed`, `down` or `stranded`; `deploying` from the event that begins it on, and
+    /// `shutting_down` from the one that ends it on, until the next of these is told.
+    pub standing: &'static str,
+    /// Its own coordinators, by name.
+    pub coordinators: Vec<String>,
 }
 
 /// A deployment at one moment: what `status --json` prints.
@@ -286,6 +304,9 @@ pub struct StatusView {
     pub coordinator: Vec<String>,
     /// The same of every coordinator, by name; the one above is the first.
     pub coordinators: BTreeMap<String, Vec<String>>,
+    /// Its subsystems to any depth, parents before their children.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub subsystems: Vec<SubsystemStatus>,
     /// The system as the configurator knows it; none, as of the next two: it has not answered, and nobody knows.
     pub system: Option<Snapshot>,
     /// Frames in force, newest last.

@@ -9,6 +9,7 @@ pub mod client;
 mod connection;
 mod doors;
 mod halt;
+mod hierarchy;
 pub mod hub;
 pub mod kept;
 mod lanes;

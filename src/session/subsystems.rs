@@ -1,7 +1,7 @@
 //! The subsystems of a deployment that runs (semantics: *Composition*): who hears what, and what a parent is told without anybody writing it.
 
 use super::hub::Hub;
-use super::log::Happening;
+use super::log::{Happening, Phase, SubsystemStatus};
 use super::routes::Junction;
 use crate::configurator::Requester;
 use crate::coordinator::{Class, CoordinatorHandle, Incoming, Tag};
@@ -45,6 +45,19 @@ struct SubsystemLife {
     down_until: Option<Time>,
     /// It was down with nothing left, and has asked for nothing since.
     empty: bool,
+}
+
+impl SubsystemLife {
+    /// In one word: what was told last, but for one that is on its way.
+    fn standing(&self) -> &'static str {
+        match self.told {
+            Some(SubsystemStanding::Stranded) if self.up_until.is_none() => SubsystemStanding::Stranded.word(),
+            _ if self.down_until.is_some() => Phase::ShuttingDown.as_str(),
+            Some(SubsystemStanding::Failed) => SubsystemStanding::Failed.word(),
+            Some(told) if self.up_until.is_none() => told.word(),
+            _ => Phase::Deploying.as_str(),
+        }
+    }
 }
 
 /// An event that a subsystem may take or not.
@@ -224,6 +237,18 @@ impl Subsystems {
         if let Some(at) = self.all.iter().position(|known| known.path == *path) {
             self.look_at(at, hub, junction);
         }
+    }
+
+    /// How they stand.
+    pub fn view(&self) -> Vec<SubsystemStatus> {
+        let lives = lock(&self.lives);
+        let all = self.all.iter().zip(lives.iter());
+        let view = |(known, life): (&KnownSubsystem, &SubsystemLife)| SubsystemStatus {
+            name: known.path.to_string(),
+            standing: life.standing(),
+            coordinators: known.coordinators.iter().map(|(name, _)| name.to_string()).collect(),
+        };
+        all.map(view).collect()
     }
 
     fn look_at(&self, at: usize, hub: &Hub, junction: &Junction) {

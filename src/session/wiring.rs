@@ -323,8 +323,9 @@ impl Session {
             phase,
             coordinator: self.parts[0].coordinator.active(),
             coordinators: self.active(),
+            subsystems: self.junction.subsystems().map_or_else(Vec::new, Subsystems::view),
             system: view.map(|view| view.and_then(|view| view.system.as_deref().cloned()).unwrap_or_default()),
-            stack: frames.map(|frames| frames.iter().map(FrameStatus::of).collect()),
+            stack: frames.map(|frames| frames.iter().map(|frame| FrameStatus::of(frame, &self.deployment)).collect()),
             residual: view.map(|view| view.map_or_else(Vec::new, Difference::of_view)),
             faults: self.hub.faults(),
             outstanding: self.hub.outstanding(),
@@ -468,21 +469,6 @@ impl Drop for Session {
     fn drop(&mut self) {
         self.detach_coordinator();
         self.part();
-    }
-}
-
-impl FrameStatus {
-    fn of(frame: &crate::configurator::FrameView) -> Self {
-        Self {
-            configuration: frame.configuration.to_string(),
-            by: frame.by.to_string(),
-            at: frame.at.as_secs_f64(),
-            parts: frame.parts,
-            floor: frame.floor,
-            partial: frame.partial,
-            lost: frame.lost,
-            unseen: frame.unseen,
-        }
     }
 }
 
