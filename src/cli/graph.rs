@@ -2,20 +2,26 @@
 
 use super::exit::Exit;
 use super::input::{CommandInput, CoordinatorInput, Parameters, coordinators, is_deployment, which};
+use super::inside::{Inside, Region};
+use super::plan_groups::{PlacedPlan, PlanGroup, grouped, placed};
 use super::remote::{ASK, ask};
 use super::{CommandContext, CommandFailure, CommandResult, Run, write_output};
 use crate::app::{drive, plan, plan_way, wrong_in_others};
 use crate::check::Until;
 use crate::diagnostics::Language;
-use crate::draw;
+use crate::draw::{self, ComponentsView, DrawnPlan, PlacedCoordinator};
 use crate::lang;
-use crate::model::Findings;
 use crate::model::codes::CLI_FORMAT_OF_COORDINATORS;
+use crate::model::finding::count;
 use crate::model::program::AuxiliaryFunction;
+use crate::model::{Findings, Ident, Step};
 use serde_json::json;
 use std::path::PathBuf;
 
 /// Draw a deployment: its components as they are when up, its coordinators, or its bring-up plan.
+///
+/// A subsystem is a box, with what is in it. Between a coordinator and the subsystems of its file arrows show the events that it
+/// raises there, and dashed ones those that it listens to.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The deployment file (for a coordinator alone, its own file serves as well).
@@ -33,6 +39,11 @@ pub struct Args {
     /// Which coordinator, of a deployment with several; without it, all of them in one picture.
     #[arg(long, value_name = "NAME")]
     of: Option<String>,
+    #[command(flatten)]
+    inside: Inside,
+    /// Draw subsystems that are more than N levels deep (0: all of them) as one box each; without it everything is drawn.
+    #[arg(long, value_name = "N")]
+    depth: Option<usize>,
     /// Mark the states that are active in the running deployment.
     #[arg(long)]
     live: bool,
@@ -80,7 +91,7 @@ impl Run for Args {
     fn run(self, context: &CommandContext) -> CommandResult {
         let what = if is_deployment(&self.file) { self.what } else { Drawn::Coordinator };
         let picture = if what == Drawn::Coordinator {
-            let mut all = coordinators(&self.file, &self.parameters, self.of.as_deref(), &[])?;
+            let mut all = coordinators(&self.file, &self.parameters, &self.inside, self.of.as_deref(), &[])?;
             if all.len() > 1 {
                 return self.several(context, &all);
             }
@@ -108,7 +119,15 @@ impl Run for Args {
                 CommandInput { file: self.file.clone(), parameters: self.parameters.clone() }.read_but_for(context)?;
             let refused =
                 |findings| CommandFailure { findings, sources: read.sources.clone(), ..CommandFailure::default() };
-            let name = read.deployment.name;
+            let subsystems = read.deployment.all_subsystems();
+            let region = self.inside.among(subsystems.iter().map(|(path, _)| path.as_str()))?;
+            let region = region.as_ref();
+            let name = match region {
+                Some(region) => format!("{}/{}", read.deployment.name, region.path()),
+                None => read.deployment.name.to_string(),
+            };
+            let full = |id: &String| region.map_or_else(|| id.clone(), |region| region.full(id));
+            let ids: Vec<String> = self.ids.iter().map(full).collect();
             // What is wrong with configurations that are not drawn refuses nothing.
             let tell_others = |told: Option<&Findings>| {
                 let told = told.map_or(&[][..], Vec::as_slice);
@@ -116,18 +135,14 @@ impl Run for Args {
             };
             match what {
                 Drawn::Plan => {
-                    let plans = if self.ids.is_empty() { plan_way(&read, Until::Up) } else { plan(&read, &self.ids) };
+                    let plans = if self.ids.is_empty() { plan_way(&read, Until::Up) } else { plan(&read, &ids) };
                     tell_others(plans.as_ref().err());
-                    let plans: Vec<_> = plans
-                        .map_err(refused)?
-                        .into_iter()
-                        .map(|p| {
-                            let asks: Vec<String> = p.asks.iter().map(ToString::to_string).collect();
-                            let of = p.coordinator.map_or_else(String::new, |name| format!("{name}: "));
-                            (format!("{of}{}", asks.join(", ")), p.steps)
-                        })
-                        .collect();
-                    draw::plan(&format!("{name}: plan"), &plans)
+                    let plans = plans.map_err(refused)?;
+                    let placed = placed(&read.deployment, &plans, region);
+                    let drawn: Vec<DrawnPlan> =
+                        grouped(&placed, self.depth).iter().flat_map(|group| drawn(group, region)).collect();
+                    let said = |step: &Step| region.map_or(step.to_string(), |region| region.step(&step.to_string()));
+                    draw::plan(&format!("{name}: plan"), &drawn, &said)
                 }
                 _ => {
                     let system = if self.ids.is_empty() {
@@ -139,13 +154,16 @@ impl Run for Args {
                         }
                         drive.system
                     } else {
-                        let planned = plan(&read, &self.ids);
+                        let planned = plan(&read, &ids);
                         tell_others(planned.as_ref().err());
                         let planned = planned.map_err(refused)?;
                         planned.into_iter().last().map(|p| p.result).unwrap_or_default()
                     };
                     let title = format!("{name}: components");
-                    draw::components(&title, &system, &read.catalogue, &read.deployment.monitors)
+                    let is_it = |path: &&Ident| region.is_some_and(|region| region.path() == path.as_str());
+                    let inside = subsystems.iter().map(|(path, _)| path).find(is_it).copied();
+                    let view = ComponentsView { inside, depth: self.depth };
+                    draw::components(&title, &system, &read.catalogue, &read.deployment.monitors, view)
                 }
             }
         };
@@ -162,6 +180,25 @@ fn asks_beside(read: &CoordinatorInput) -> bool {
     read.chart.is_pure() && read.program.iter().any(|program| program.beside.iter().any(asks))
 }
 
+/// What is planned in one file: each plan with who asks for it, or all of them as one box.
+fn drawn(group: &PlanGroup<'_, '_>, region: Option<&Region>) -> Vec<DrawnPlan> {
+    let steps = |one: &PlacedPlan<'_>| one.plan.steps.len();
+    if group.folded {
+        let number = [
+            count(group.plans.len(), "request"),
+            count(group.plans.iter().map(|one| steps(one)).sum::<usize>(), "step"),
+        ];
+        return vec![DrawnPlan { heading: group.path.to_owned(), lines: number.to_vec(), steps: Vec::new() }];
+    }
+    let heading = |one: &PlacedPlan<'_>| {
+        let of = one.by.as_deref().or(Some(group.path).filter(|path| !path.is_empty()));
+        format!("{}{}", of.map_or_else(String::new, |of| format!("{of}: ")), one.asks(region))
+    };
+    let plan =
+        |one: &&PlacedPlan<'_>| DrawnPlan { heading: heading(one), lines: Vec::new(), steps: one.plan.steps.clone() };
+    group.plans.iter().map(plan).collect()
+}
+
 impl Args {
     /// All coordinators of a deployment in one picture.
     fn several(&self, context: &CommandContext, all: &[CoordinatorInput]) -> CommandResult {
@@ -172,17 +209,24 @@ impl Args {
         if let Some(first) = all.first() {
             context.out.findings(&first.findings, &first.sources);
         }
-        let (mut names, mut charts) = (Vec::with_capacity(all.len()), Vec::with_capacity(all.len()));
+        let mut names = Vec::with_capacity(all.len());
         for one in all {
-            let active = if self.live { self.active(one)? } else { Vec::new() };
             let mark = if asks_beside(one) { UNVERIFIED } else { "" };
-            names.push(format!("{}{mark}", one.of.as_deref().unwrap_or_default()));
-            charts.push((&one.chart, active));
+            let active = if self.live { self.active(one)? } else { Vec::new() };
+            names.push((format!("{}{mark}", one.of.as_deref().unwrap_or_default()), active));
         }
-        let charts: Vec<_> =
-            names.iter().zip(charts).map(|(name, (chart, active))| (name.as_str(), chart, active)).collect();
+        let placed = all.iter().zip(&names).map(|(one, (name, active))| PlacedCoordinator {
+            name,
+            path: &one.path,
+            chart: &one.in_file,
+            active: active.clone(),
+        });
+        let charts: Vec<_> = placed.collect();
         let name = all.first().map_or("", |one| one.name.as_str());
-        self.write(context, &draw::coordinators(&format!("{name}: coordinators"), &charts))
+        self.write(
+            context,
+            &draw::coordinators(&format!("{name}: coordinators"), &charts, self.depth.unwrap_or(usize::MAX)),
+        )
     }
 
     fn write(&self, context: &CommandContext, picture: &draw::Diagram) -> CommandResult {
@@ -206,7 +250,7 @@ impl Args {
     fn active(&self, read: &CoordinatorInput) -> Result<Vec<String>, CommandFailure> {
         let name = self.on.as_deref().or(read.deployment.as_deref());
         let status = ask(name, "status", &json!({}), ASK)?;
-        let states = match &read.of {
+        let states = match &read.full {
             Some(of) => &status["coordinators"][of.as_str()],
             None => &status["coordinator"],
         };

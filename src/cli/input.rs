@@ -2,13 +2,14 @@
 //! from its work.
 
 use super::exit::Exit;
+use super::inside::Inside;
 use super::{CommandContext, CommandFailure};
 use crate::app::{self, Checked, Read, Refused};
 use crate::diagnostics::SourceMap;
 use crate::lang::{self, LoadOptions, Sources};
 use crate::model::codes::{CLI_BAD_SET, CLI_WHICH_COORDINATOR};
 use crate::model::finding::did_you_mean;
-use crate::model::{Findings, Ident, Program, Statechart};
+use crate::model::{CoordinatorNaming, Deployment, Findings, Program, Statechart};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -92,10 +93,16 @@ pub struct CoordinatorInput {
     pub name: String,
     /// The deployment that names it, if it was read from one.
     pub deployment: Option<String>,
-    /// Its name in a deployment.
+    /// Its name in a deployment, or in the subsystem that is looked into.
     pub of: Option<String>,
+    /// The same from outside, by which the running deployment knows it.
+    pub full: Option<String>,
+    /// The path of the subsystem whose it is; empty: it is of the file that is looked into.
+    pub path: String,
     /// The coordinator.
     pub chart: Statechart,
+    /// The same by the names of its own file.
+    pub in_file: Statechart,
     /// Its texts, when it has functions.
     pub program: Option<Arc<Program>>,
     /// Its texts.
@@ -112,10 +119,11 @@ pub struct CoordinatorInput {
 pub fn coordinator(
     path: &Path,
     parameters: &Parameters,
+    inside: &Inside,
     of: Option<&str>,
     host: &[PathBuf],
 ) -> Result<CoordinatorInput, CommandFailure> {
-    let mut all = coordinators(path, parameters, of, host)?;
+    let mut all = coordinators(path, parameters, inside, of, host)?;
     match (all.pop(), all.is_empty()) {
         (Some(only), true) => Ok(only),
         (last, _) => Err(which(all.iter().chain(&last))),
@@ -139,6 +147,7 @@ pub fn which<'a>(all: impl Iterator<Item = &'a CoordinatorInput>) -> CommandFail
 pub fn coordinators(
     path: &Path,
     parameters: &Parameters,
+    inside: &Inside,
     of: Option<&str>,
     host: &[PathBuf],
 ) -> Result<Vec<CoordinatorInput>, CommandFailure> {
@@ -149,31 +158,52 @@ pub fn coordinators(
         let Some(d) = loaded.deployment else {
             return Err(unread(loaded.findings, loaded.sources, loaded.unreadable));
         };
-        let named = d.name.to_string();
-        let known: Vec<Ident> = d.coordinators.iter().map(|own| own.name).collect();
-        if let Some(of) = of.filter(|of| known.iter().all(|name| name.as_str() != *of)) {
-            let help = did_you_mean(of, "coordinators", known.iter().map(Ident::as_str));
+        let all = d.all_subsystems();
+        let region = inside.among(all.iter().map(|(path, _)| path.as_str()))?;
+        let inside = all.iter().find(|(path, _)| region.as_ref().is_some_and(|region| region.path() == path.as_str()));
+        let file: &Deployment = inside.map_or(&d, |(_, subsystem)| &subsystem.own);
+        let named: Vec<CoordinatorInput> = file
+            .coordinators
+            .iter()
+            .map(|own| {
+                let alone = own.of.is_none() && own.written == CoordinatorNaming::Alone;
+                let (of, full) = match &region {
+                    // It is called like its file's deployment there, and like the subsystem outside.
+                    Some(region) if alone => (region.last().to_owned(), region.path().to_owned()),
+                    Some(region) => (own.name.to_string(), region.full(own.name.as_str())),
+                    None => (own.name.to_string(), own.name.to_string()),
+                };
+                CoordinatorInput {
+                    name: region.as_ref().map_or_else(|| name.clone(), |region| format!("{name}/{}", region.path())),
+                    deployment: Some(d.name.to_string()),
+                    of: Some(of),
+                    full: Some(full),
+                    path: own.of.map_or_else(String::new, |path| path.to_string()),
+                    program: d.programs.get(&own.name).cloned(),
+                    in_file: file.in_its_file(own).chart.clone(),
+                    chart: own.chart.clone(),
+                    sources: loaded.sources.clone(),
+                    findings: loaded.findings.clone(),
+                }
+            })
+            .collect();
+        let known: Vec<&str> = named.iter().filter_map(|one| one.of.as_deref()).collect();
+        if let Some(of) = of.filter(|of| !known.contains(of)) {
+            let help = did_you_mean(of, "coordinators", known);
             return Err(CommandFailure::usage(CLI_WHICH_COORDINATOR, format!("there is no coordinator `{of}`"), help));
         }
-        let wanted = |own: &crate::model::Coordinator| of.is_none_or(|of| own.name.as_str() == of);
-        let mut programs = d.programs;
-        let one = |own: crate::model::Coordinator| CoordinatorInput {
-            name: name.clone(),
-            deployment: Some(named.clone()),
-            of: Some(own.name.to_string()),
-            program: programs.remove(&own.name),
-            chart: own.chart,
-            sources: loaded.sources.clone(),
-            findings: loaded.findings.clone(),
-        };
-        return Ok(d.coordinators.into_iter().filter(wanted).map(one).collect());
+        return Ok(named.into_iter().filter(|one| of.is_none() || one.of.as_deref() == of).collect());
     }
+    // A file of its own is in no subsystem.
+    inside.among([])?;
     let loaded = lang::load_coordinator(&Sources::Disk, path, &options);
     match loaded.coordinator {
         Some(chart) => {
             let (program, sources, findings) = (loaded.program, loaded.sources, loaded.findings);
             let of = of.map(str::to_owned);
-            Ok(vec![CoordinatorInput { name, deployment: None, of, chart, program, sources, findings }])
+            let (full, path, in_file) = (of.clone(), String::new(), chart.clone());
+            let deployment = None;
+            Ok(vec![CoordinatorInput { name, deployment, of, full, path, in_file, chart, program, sources, findings }])
         }
         None => Err(unread(loaded.findings, loaded.sources, loaded.unreadable)),
     }

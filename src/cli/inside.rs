@@ -77,7 +77,7 @@ pub struct Region {
 }
 
 /// Who is in no file.
-const NOBODYS: [&str; 2] = [OPERATOR, "configurator"];
+const NOBODYS: [&str; 4] = [OPERATOR, "configurator", "deployment", "script"];
 
 impl Region {
     /// Its path.
@@ -130,11 +130,6 @@ impl Region {
 /// Whether a name, or a path, is that of a subsystem or in it.
 pub fn is_within(name: &str, path: &str) -> bool {
     name.strip_prefix(path).is_some_and(|rest| rest.is_empty() || rest.starts_with(['/', ':']))
-}
-
-/// How many levels below the top a path is: 0 the deployment itself.
-pub fn level(path: &str) -> usize {
-    if path.is_empty() { 0 } else { 1 + path.matches('/').count() }
 }
 
 /// What has no place in any file: who asks from outside, and a request that names nothing.

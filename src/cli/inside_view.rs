@@ -84,8 +84,9 @@ impl Region {
         if let Some(of) = subsystem.filter(|of| of != self.path()) {
             there["subsystem"] = json!(self.name(text(&of)));
         }
-        for of in list_mut(&mut there, "touches") {
-            *of = json!(self.name(text(of)));
+        if let Some(touches) = there.get_mut("touches").and_then(Json::as_array_mut) {
+            touches.retain(|of| of != self.path());
+            touches.iter_mut().for_each(|of| *of = json!(self.name(text(of))));
         }
         there
     }
@@ -176,7 +177,8 @@ impl Region {
     }
 }
 
-fn list_mut<'a>(of: &'a mut Json, field: &str) -> impl Iterator<Item = &'a mut Json> {
+/// What stands in a list of an object, to be changed.
+pub fn list_mut<'a>(of: &'a mut Json, field: &str) -> impl Iterator<Item = &'a mut Json> {
     of.get_mut(field).and_then(Json::as_array_mut).into_iter().flatten()
 }
 

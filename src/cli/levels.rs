@@ -1,10 +1,11 @@
 //! The status of a deployment taken apart: what is its own, and what is each subsystem's; and how a subsystem is folded into a line.
 
-use super::inside::{is_within, level};
+use super::inside::is_within;
 use super::inside_view::innermost;
 use super::output::{Output, Style, Table};
 use super::status::{state_style, text};
 use crate::model::finding::count;
+use crate::model::names::level;
 use serde_json::Value as Json;
 
 /// What of a status belongs to one file.
@@ -51,9 +52,9 @@ pub fn parts(status: &Json) -> Vec<FilePart<'_>> {
         Some((_, by)) => of_coordinator(by),
         None => 0,
     };
-    let coordinators: Vec<_> = entries(&status["coordinators"]).map(|(name, it)| (of_coordinator(name), name, it)).collect();
-    let components: Vec<_> =
-        entries(&status["system"]["components"]).map(|(name, it)| (of(name), name, it)).collect();
+    let coordinators: Vec<_> =
+        entries(&status["coordinators"]).map(|(name, it)| (of_coordinator(name), name, it)).collect();
+    let components: Vec<_> = entries(&status["system"]["components"]).map(|(name, it)| (of(name), name, it)).collect();
     let waiting: Vec<_> = list("outstanding").iter().map(text).map(|asked| (of_asked(asked), asked)).collect();
     let frames: Vec<_> = list("stack").iter().map(|frame| (of(text(&frame["configuration"])), frame)).collect();
     let residual: Vec<_> = list("residual").iter().map(|one| (of(text(&one["target"])), one)).collect();

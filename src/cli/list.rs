@@ -1,7 +1,6 @@
 //! `davit list`: the deployments of this user, one line each.
 
 use super::exit::Exit;
-use super::inside::level;
 use super::kept::{self, Died};
 use super::levels::{parts, states};
 use super::output::{Output, Style, Table};
@@ -10,6 +9,7 @@ use super::status::{state_style, text};
 use super::{CommandContext, CommandFailure, CommandResult, Run};
 use crate::model::codes::{CLI_NOTHING_KEPT, CLI_SYSTEM};
 use crate::model::finding::count;
+use crate::model::names::level;
 use crate::session::client::Client;
 use crate::session::kept::{Life, forget, life};
 use crate::session::{owner, place};
@@ -97,7 +97,8 @@ impl Overview {
             let phase = one["phase"].as_str().unwrap_or("no answer");
             let parts = parts(one);
             let subsystems = parts.iter().filter(|part| level(part.path) == 1);
-            let subsystems = subsystems.map(|it| format!("{} {}", it.path, out.paint(state_style(it.standing), it.standing)));
+            let subsystems =
+                subsystems.map(|it| format!("{} {}", it.path, out.paint(state_style(it.standing), it.standing)));
             let states = parts.first().map_or_else(String::new, states);
             let faults = one["faults"].as_u64().filter(|faults| *faults > 0);
             table.row([

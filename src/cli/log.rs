@@ -59,9 +59,7 @@ impl Args {
             Ok((log.as_array().cloned().unwrap_or_default(), self.status(&mut client)?))
         });
         let entries = match asked {
-            Ok((log, status)) => {
-                Sieve::new(&self.hierarchy, status.as_ref(), &log)?.newest(&log, self.last)
-            }
+            Ok((log, status)) => Sieve::new(&self.hierarchy, status.as_ref(), &log)?.newest(&log, self.last),
             Err(error) => self.kept(context, error)?,
         };
         if self.json {

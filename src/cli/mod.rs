@@ -29,6 +29,7 @@ mod member;
 mod monitor;
 pub mod output;
 mod plan;
+mod plan_groups;
 mod plan_view;
 mod printed;
 mod progress;

@@ -1,9 +1,10 @@
 //! What of a log is shown where a command looks into a subsystem, or folds them.
 
 use super::CommandFailure;
-use super::inside::{Hierarchy, Region, level};
+use super::inside::{Hierarchy, Region};
 use super::inside_view::{innermost, paths_named};
 use super::status::text;
+use crate::model::names::level;
 use serde_json::Value as Json;
 
 /// Lets entries of a log through.

@@ -2,6 +2,7 @@
 
 use super::exit::Exit;
 use super::input::{Parameters, coordinator};
+use super::inside::Inside;
 use super::output::{self, Style};
 use super::sim_editor::edit;
 use super::{CommandContext, CommandFailure, CommandResult, Run};
@@ -31,7 +32,9 @@ pub struct Args {
     /// Lines of events from a file, or from standard input as `-`; without it, from the terminal.
     #[arg(long, value_name = "FILE")]
     events: Option<PathBuf>,
-    /// Which coordinator, of a deployment with several.
+    #[command(flatten)]
+    inside: Inside,
+    /// Which coordinator, of a deployment with several (with `--in`, as it is called there).
     #[arg(long, value_name = "NAME")]
     of: Option<String>,
     /// Print one JSON object for each input line.
@@ -46,7 +49,7 @@ pub struct Args {
 
 impl Run for Args {
     fn run(self, context: &CommandContext) -> CommandResult {
-        let read = coordinator(&self.file, &self.parameters, self.of.as_deref(), &self.host)
+        let read = coordinator(&self.file, &self.parameters, &self.inside, self.of.as_deref(), &self.host)
             .map_err(|f| f.in_json(self.json))?;
         let (chart, mut findings) = compile(&read.chart);
         findings.splice(0..0, read.findings);

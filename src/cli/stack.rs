@@ -8,6 +8,7 @@ use super::status::text;
 use super::{CommandContext, CommandFailure, CommandResult, Run};
 use crate::model::codes::CLI_NO_ANSWER;
 use crate::model::finding::count;
+use crate::model::names::folded_into;
 use crate::session::Unanswered;
 use serde_json::{Value as Json, json};
 
@@ -42,7 +43,11 @@ impl Args {
             true => {
                 let status = ask(self.name.as_deref(), "status", &json!({}), ASK)?;
                 if status["stack"].is_null() {
-                    return Err(CommandFailure::no(CLI_NO_ANSWER, Unanswered.to_string(), "something may be under way that holds it up: `davit status` shows what is known"));
+                    return Err(CommandFailure::no(
+                        CLI_NO_ANSWER,
+                        Unanswered.to_string(),
+                        "something may be under way that holds it up: `davit status` shows what is known",
+                    ));
                 }
                 let frames = numbered(&status["stack"]);
                 match inside.in_status(&status)? {
@@ -84,12 +89,13 @@ fn table(out: &Output, frames: &[Json], depth: usize) -> Table {
     let mut shown: Vec<&str> = Vec::new();
     for frame in frames.iter().rev() {
         let number = out.paint(Style::Dim, &frame[NUMBER]);
-        if let Some(path) = outermost(text(&frame["subsystem"]), depth) {
+        if let Some(path) = folded_into(text(&frame["subsystem"]), depth) {
             if !shown.contains(&path) {
                 shown.push(path);
                 let inside: Vec<&Json> =
                     frames.iter().filter(|other| is_within(text(&other["subsystem"]), path)).collect();
-                let marks = ["partial", "lost"].into_iter().filter(|mark| inside.iter().any(|frame| frame[*mark] == true));
+                let marks =
+                    ["partial", "lost"].into_iter().filter(|mark| inside.iter().any(|frame| frame[*mark] == true));
                 table.row([
                     number,
                     out.paint(Style::Bold, path),
@@ -116,10 +122,4 @@ fn table(out: &Output, frames: &[Json], depth: usize) -> Table {
         ]);
     }
     table
-}
-
-/// The beginning of a path that is the first deeper than `depth`.
-fn outermost(path: &str, depth: usize) -> Option<&str> {
-    let ends = path.match_indices('/').map(|(at, _)| at).chain([path.len()]);
-    ends.filter(|end| *end > 0).nth(depth).map(|end| &path[..end])
 }

@@ -8,9 +8,9 @@ use super::output::{Output, Style};
 use super::remote::{ASK, failure};
 use super::status_view::print;
 use super::{CommandContext, CommandFailure, CommandResult, Run};
+use crate::session::Unanswered;
 use crate::session::client::{Client, ClientError};
 use crate::session::kept::Life;
-use crate::session::Unanswered;
 use serde_json::{Value as Json, json};
 
 /// Show a running deployment: its phase, the coordinator's states, components, faults. Of one that died: when, and how far it

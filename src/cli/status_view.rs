@@ -130,8 +130,9 @@ pub fn held_by(out: &Output, status: &Json) -> Vec<String> {
 fn dropped(out: &Output, status: &Json) -> Vec<String> {
     let word = out.paint(Style::Care, "dropped");
     let number = |kind: &str| status["dropped"][kind].as_u64().filter(|number| *number > 0);
-    let inside = number("inside")
-        .map(|inside| format!("{word}      {} that a coordinator sent to itself: too many at once", count(inside, "event")));
+    let inside = number("inside").map(|inside| {
+        format!("{word}      {} that a coordinator sent to itself: too many at once", count(inside, "event"))
+    });
     let others = [("report", "lost"), ("outside", "from outside, refused")].into_iter().filter_map(|(kind, what)| {
         let dropped = count(number(kind)?, "event");
         Some(format!("{word}      {dropped} {what}: the coordinator does not keep up"))

@@ -4,7 +4,7 @@
 //! to the deployment.
 
 use super::exit::Exit;
-use super::inside::{Hierarchy, level};
+use super::inside::Hierarchy;
 use super::kept;
 use super::levels::{FilePart, each, folded, leaf, parts, states};
 use super::list::silent;
@@ -15,6 +15,7 @@ use super::status::{not_known, state_style, text};
 use super::status_view::{heading, held_by, indented, title};
 use super::{CommandContext, CommandResult, Run};
 use crate::model::finding::count;
+use crate::model::names::level;
 use crate::session::client::{Client, ClientError};
 use crate::session::owner;
 use crate::time::Clock;
@@ -198,7 +199,9 @@ fn leaves(out: &Output, status: &Json, depth: Option<usize>) -> String {
     for part in &parts(status) {
         match level(part.path).saturating_sub(depth.unwrap_or(usize::MAX)) {
             0 if part.path.is_empty() => said.push(out.paint(Style::Name, states(part))),
-            0 => said.extend(part.coordinators.iter().map(|(name, it)| format!("{name}:{}", out.paint(Style::Name, leaf(it))))),
+            0 => said.extend(
+                part.coordinators.iter().map(|(name, it)| format!("{name}:{}", out.paint(Style::Name, leaf(it)))),
+            ),
             1 => said.push(format!("{} {}", part.path, out.paint(state_style(part.standing), part.standing))),
             _ => {}
         }

@@ -1,6 +1,8 @@
 //! The components of a system, their ports and connections.
 
-use super::diagram::{Diagram, DiagramEdge, DiagramNode, RankDirection, Subject, Tone};
+use super::components_view::{ComponentPlace, ComponentsView, FoldedBox, tone};
+use super::diagram::{Diagram, DiagramEdge, DiagramNode, RankDirection, Subject};
+use super::hierarchy::SubsystemBoxes;
 use super::text::short;
 use crate::model::monitor::{ConditionKind, SignalKind, is_monitors};
 use crate::model::{
@@ -12,41 +14,41 @@ use std::collections::{BTreeMap, BTreeSet};
 /// What a system looks like: a box for each component with its type, its run state and those of its ports that are
 /// connected, written or watched; an edge for each connection, labelled with its policy where that is not `data`. A
 /// component that runs `monitors` has a dashed line from each port they watch, and a row for each of them with its events.
-pub fn components(title: &str, system: &Snapshot, catalogue: &Catalogue, monitors: &[Monitor]) -> Diagram {
+pub fn components(
+    title: &str,
+    system: &Snapshot,
+    catalogue: &Catalogue,
+    monitors: &[Monitor],
+    view: ComponentsView,
+) -> Diagram {
     let mut diagram = Diagram::new(Subject::Components, RankDirection::Right, title);
+    let is_own = |name: ComponentName| matches!(view.place(name), ComponentPlace::Own(_));
     let mut used: BTreeSet<MemberRef> = BTreeSet::new();
-    for (from, to) in system.connections.keys() {
-        used.insert(*from);
-        used.insert(*to);
-    }
-    used.extend(system.ports.keys());
+    let connections = || system.connections.iter().filter(|((from, to), _)| view.shows(*from, *to));
+    used.extend(connections().flat_map(|((from, to), _)| [*from, *to]));
+    used.extend(system.ports.keys().filter(|port| is_own(port.component)));
     let watching = |ty: TypeName| is_monitors(ty);
-    let watched: Vec<(&Monitor, BTreeSet<WatchedMember>)> = match system.components.values().any(|c| watching(c.ty)) {
-        true => monitors.iter().map(|monitor| (monitor, watches(monitor))).collect(),
-        false => Vec::new(),
-    };
+    let watchers: BTreeSet<TypeName> =
+        system.components.iter().filter(|(name, c)| watching(c.ty) && is_own(**name)).map(|(_, c)| c.ty).collect();
+    let watched: Vec<(&Monitor, BTreeSet<WatchedMember>)> = monitors
+        .iter()
+        .filter(|monitor| watchers.contains(&monitor.run_by()))
+        .map(|monitor| (monitor, watches(monitor)))
+        .collect();
     used.extend(watched.iter().flat_map(|(_, of)| of).filter_map(|watched| match watched {
         WatchedMember::Port(port) => Some(*port),
         WatchedMember::Component(_) => None,
     }));
     let mut boxes: BTreeMap<ComponentName, usize> = BTreeMap::new();
     let mut rows: BTreeMap<MemberRef, (PortDirection, usize)> = BTreeMap::new();
-    let mut groups: BTreeMap<&str, usize> = BTreeMap::new();
+    let mut groups = SubsystemBoxes::default();
     let mut tones: BTreeSet<RunState> = BTreeSet::new();
     let mut lines: Vec<(WatchedMember, ComponentName, usize)> = Vec::new();
+    let mut folded: BTreeMap<&str, FoldedBox> = BTreeMap::new();
     for (name, component) in &system.components {
-        let parent = subsystem(&mut diagram, &mut groups, name.prefix());
-        let own = name.as_str().rsplit('/').next().unwrap_or(name.as_str());
-        let mut node = DiagramNode::new(name.as_str(), own);
-        node.parent = parent;
-        node.lines.push(component.ty.to_string());
-        node.lines.push(match component.activity {
-            Some(activity) => format!("{} · {activity}", component.state),
-            None => component.state.to_string(),
-        });
-        node.tone = tone(component.state);
-        tones.insert(component.state);
-        if let Some(ty) = catalogue.get(component.ty) {
+        let place = view.place(*name);
+        let ports = |node: &mut DiagramNode, rows: &mut BTreeMap<MemberRef, (PortDirection, usize)>, before: &str| {
+            let Some(ty) = catalogue.get(component.ty) else { return };
             for (port, description) in &ty.ports {
                 let member = name.member(*port);
                 if !used.contains(&member) {
@@ -58,21 +60,53 @@ pub fn components(title: &str, system: &Snapshot, catalogue: &Catalogue, monitor
                 };
                 rows.insert(member, (description.direction, list.len()));
                 list.push(match system.ports.get(&member) {
-                    Some(value) => format!("{port} = {}", short(&value.to_string(), 18)),
-                    None => port.to_string(),
+                    Some(value) => format!("{before}{port} = {}", short(&value.to_string(), 18)),
+                    None => format!("{before}{port}"),
                 });
             }
-        }
-        if watching(component.ty) {
+        };
+        let (parent, own) = match place {
+            ComponentPlace::Own(path) => {
+                (groups.of(&mut diagram, path), name.as_str().rsplit('/').next().unwrap_or(name.as_str()).to_owned())
+            }
+            ComponentPlace::Folded(path) => {
+                let folded = folded.entry(path).or_insert_with(|| FoldedBox::new(&mut diagram, &mut groups, path));
+                folded.states.push(component.state);
+                let called = view.called(name.as_str());
+                let before = called.strip_prefix(path).and_then(|rest| rest.strip_prefix('/')).unwrap_or(&called);
+                ports(&mut diagram.nodes[folded.at], &mut rows, &format!("{before}."));
+                boxes.insert(*name, folded.at);
+                continue;
+            }
+            ComponentPlace::Outside if used.iter().any(|member| member.component == *name) => {
+                (None, view.called(name.as_str()))
+            }
+            ComponentPlace::Outside => continue,
+        };
+        let mut node = DiagramNode::new(name.as_str(), own);
+        node.parent = parent;
+        let ty = component.ty.as_str();
+        // Types are the same everywhere, but for that of a subsystem's monitors.
+        node.lines.push(if ty.contains('/') { view.called(ty) } else { ty.to_owned() });
+        node.lines.push(match component.activity {
+            Some(activity) if place != ComponentPlace::Outside => {
+                format!("{} · {}", component.state, view.called(activity.as_str()))
+            }
+            _ => component.state.to_string(),
+        });
+        node.tone = tone(component.state);
+        tones.insert(component.state);
+        ports(&mut node, &mut rows, "");
+        if watching(component.ty) && is_own(*name) {
             // A row for each thing that is watched, not for each monitor: several watch one port.
             let own = || watched.iter().filter(|(monitor, _)| monitor.run_by() == component.ty);
             for of in own().flat_map(|(_, of)| of).collect::<BTreeSet<_>>() {
                 lines.push((*of, *name, node.ins.len()));
-                node.ins.push(of.to_string());
+                node.ins.push(view.called(&of.to_string()));
             }
             for (monitor, _) in own() {
                 let off = component.properties.get(&monitor.own_name()) == Some(&Value::Bool(false));
-                let events: Vec<&str> = monitor.events().map(|event| event.as_str()).collect();
+                let events: Vec<String> = monitor.events().map(|event| view.called(event.as_str())).collect();
                 let arrow = if events.is_empty() { "" } else { " → " };
                 let off = if off { " (off)" } else { "" };
                 node.outs.push(format!("{}{off}{arrow}{}", monitor.own_name(), events.join(", ")));
@@ -80,7 +114,10 @@ pub fn components(title: &str, system: &Snapshot, catalogue: &Catalogue, monitor
         }
         boxes.insert(*name, diagram.add(node));
     }
-    for ((from, to), policy) in &system.connections {
+    for folded in folded.into_values() {
+        folded.say(&mut diagram, &mut tones);
+    }
+    for ((from, to), policy) in connections() {
         let (Some(a), Some(b)) = (boxes.get(&from.component), boxes.get(&to.component)) else { continue };
         let mut edge = DiagramEdge::new(*a, *b);
         edge.from_port = rows.get(from).map(|(_, row)| *row);
@@ -140,33 +177,6 @@ fn watches(monitor: &Monitor) -> BTreeSet<WatchedMember> {
         _ => {}
     });
     of
-}
-
-/// The group of a subsystem's path, made where it is not there yet.
-fn subsystem<'a>(diagram: &mut Diagram, groups: &mut BTreeMap<&'a str, usize>, path: &'a str) -> Option<usize> {
-    if path.is_empty() {
-        return None;
-    }
-    if let Some(group) = groups.get(path) {
-        return Some(*group);
-    }
-    let (outer, own) = path.rsplit_once('/').unwrap_or(("", path));
-    let parent = subsystem(diagram, groups, outer);
-    let mut node = DiagramNode::new(path, own);
-    node.shape = super::diagram::Shape::Group;
-    node.parent = parent;
-    let group = diagram.add(node);
-    groups.insert(path, group);
-    Some(group)
-}
-
-fn tone(state: RunState) -> Tone {
-    match state {
-        RunState::Unconfigured => Tone::Quiet,
-        RunState::Stopped => Tone::Care,
-        RunState::Running => Tone::Good,
-        RunState::Faulted => Tone::Bad,
-    }
 }
 
 #[cfg(test)]
@@ -247,7 +257,7 @@ mod tests {
     #[test]
     fn every_component_port_and_connection_is_drawn() {
         let (system, catalogue) = youbot();
-        let diagram = components("youbot", &system, &catalogue, &[]);
+        let diagram = components("youbot", &system, &catalogue, &[], ComponentsView::default());
         assert_eq!(diagram.edges.len(), system.connections.len());
         assert!(diagram.edges.iter().all(|e| e.from_port.is_some() && e.to_port.is_some()));
         let svg = diagram.svg();
@@ -287,7 +297,10 @@ mod tests {
             monitor("both", Condition::new(ConditionKind::Any(vec![silent("Link_Rx.link_stats"), faulted])), None),
             monitor("inward", silent("Dynamics.f_des"), None),
         ];
-        assert_eq!(components("none", &system, &catalogue, &monitors).edges.len(), system.connections.len());
+        assert_eq!(
+            components("none", &system, &catalogue, &monitors, ComponentsView::default()).edges.len(),
+            system.connections.len()
+        );
         catalogue.insert(ComponentType::new(MONITORS_TYPE, ""));
         let properties = BTreeMap::from([(name("both"), Value::Bool(false)), (name("lost"), Value::Bool(true))]);
         let component = ComponentSnapshot {
@@ -297,7 +310,7 @@ mod tests {
             activity: None,
         };
         system.components.insert(ComponentName::new("Monitors").unwrap(), component);
-        let diagram = components("youbot", &system, &catalogue, &monitors);
+        let diagram = components("youbot", &system, &catalogue, &monitors, ComponentsView::default());
         let at = diagram.nodes.iter().position(|node| node.title == "Monitors").unwrap();
         assert_eq!(diagram.nodes[at].ins, ["Dynamics.f_des", "Link_Rx.link_stats", "Base_Ctrl"]);
         assert_eq!(diagram.nodes[at].outs, ["lost → e_lost", "both (off)", "inward"]);

@@ -26,25 +26,10 @@ pub fn coordinator(title: &str, chart: &Statechart, active: &[String]) -> Diagra
 }
 
 /// What stands beside the name of a coordinator with functions.
-const UNVERIFIED: &str = "functions are not verified";
-
-/// Several coordinators side by side, each in a box with its name: name, statechart and active states of each.
-pub fn coordinators(title: &str, all: &[(&str, &Statechart, Vec<String>)]) -> Diagram {
-    let mut diagram = Diagram::new(Subject::Statechart, RankDirection::Down, title);
-    for (name, chart, active) in all {
-        let mut group = DiagramNode::new(*name, *name);
-        group.shape = Shape::Group;
-        if !chart.is_pure() {
-            group.lines.push(UNVERIFIED.to_owned());
-        }
-        let group = diagram.add(group);
-        draw(&mut diagram, chart, active, &format!("{name}:"), Some(group));
-    }
-    diagram
-}
+pub(super) const UNVERIFIED: &str = "functions are not verified";
 
 /// One coordinator inside `parent`; the names of its nodes begin with `prefix`.
-fn draw(diagram: &mut Diagram, chart: &Statechart, active: &[String], prefix: &str, parent: Option<usize>) {
+pub(super) fn draw(diagram: &mut Diagram, chart: &Statechart, active: &[String], prefix: &str, parent: Option<usize>) {
     let first = diagram.edges.len();
     let mut drawing = Drawing { diagram, index: BTreeMap::new(), active, prefix };
     drawing.state_content(&chart.root, ROOT, parent);
@@ -219,7 +204,7 @@ fn transition_lines(transition: &ChartTransition, connector: bool) -> Vec<String
 }
 
 /// Events as few lines, and how many more there are.
-fn fold(events: &[String]) -> Vec<String> {
+pub(super) fn fold(events: &[String]) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for (i, event) in events.iter().enumerate() {
         let last = i + 1 == events.len();

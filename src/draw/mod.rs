@@ -3,10 +3,12 @@
 //! Each subject becomes one [`Diagram`]; each format writes any diagram. Knows no file and no terminal.
 
 mod components;
+mod components_view;
 mod coordinator;
 pub mod diagram;
 mod dot;
 mod exchange;
+mod hierarchy;
 pub mod layout;
 mod mermaid;
 mod plan;
@@ -14,10 +16,12 @@ mod svg;
 mod text;
 
 pub use components::components;
-pub use coordinator::{coordinator, coordinators};
+pub use components_view::ComponentsView;
+pub use coordinator::coordinator;
 pub use diagram::Diagram;
 pub use exchange::{coordinator_json, coordinator_plantuml};
-pub use plan::plan;
+pub use hierarchy::{PlacedCoordinator, coordinators};
+pub use plan::{DrawnPlan, plan};
 
 impl Diagram {
     /// The diagram as SVG.

@@ -2,6 +2,7 @@
 
 use super::diagram::{Diagram, DiagramEdge, DiagramNode, RankDirection, Shape, Subject, Tone};
 use super::text::short;
+use crate::model::Step;
 use crate::plan::{PlanStage, PlannedStep};
 use crate::system::Reversibility;
 use std::collections::BTreeMap;
@@ -10,16 +11,28 @@ use std::collections::BTreeMap;
 /// diagram would be a ribbon.
 const ROW: usize = 3;
 
-/// What plans look like that are carried out one after the other, each with a heading.
-pub fn plan(title: &str, plans: &[(String, Vec<PlannedStep>)]) -> Diagram {
+/// A plan that is drawn.
+#[derive(Debug, Clone)]
+pub struct DrawnPlan {
+    /// What stands above it.
+    pub heading: String,
+    /// What is said of it below that.
+    pub lines: Vec<String>,
+    /// Its steps; none where it is folded.
+    pub steps: Vec<PlannedStep>,
+}
+
+/// What plans look like that are carried out one after the other. `said` is how a step is spelt.
+pub fn plan(title: &str, plans: &[DrawnPlan], said: &dyn Fn(&Step) -> String) -> Diagram {
     let mut diagram = Diagram::new(Subject::Plan, RankDirection::Right, title);
     let mut before: Option<usize> = None;
     let row = plans.len() <= ROW;
-    for (i, (heading, steps)) in plans.iter().enumerate() {
+    for (i, DrawnPlan { heading, lines, steps }) in plans.iter().enumerate() {
         let heading = if row { heading.clone() } else { format!("{}. {heading}", i + 1) };
         let mut group = DiagramNode::new(format!("plan{}", diagram.nodes.len()), heading);
         group.shape = Shape::Group;
-        if steps.is_empty() {
+        group.lines.clone_from(lines);
+        if steps.is_empty() && lines.is_empty() {
             group.lines.push("nothing to do".to_owned());
         }
         let group = diagram.add(group);
@@ -27,7 +40,7 @@ pub fn plan(title: &str, plans: &[(String, Vec<PlannedStep>)]) -> Diagram {
             diagram.edges.push(DiagramEdge::new(before, group));
         }
         before = Some(group);
-        lanes(&mut diagram, group, steps);
+        lanes(&mut diagram, group, steps, said);
     }
     diagram.legend = vec![
         (Tone::Good, "exact: its inverse restores what was".to_owned()),
@@ -37,7 +50,7 @@ pub fn plan(title: &str, plans: &[(String, Vec<PlannedStep>)]) -> Diagram {
     diagram
 }
 
-fn lanes(diagram: &mut Diagram, group: usize, steps: &[PlannedStep]) {
+fn lanes(diagram: &mut Diagram, group: usize, steps: &[PlannedStep], said: &dyn Fn(&Step) -> String) {
     let mut lanes: BTreeMap<u32, usize> = BTreeMap::new();
     let mut nodes: BTreeMap<u32, usize> = BTreeMap::new();
     let mut last: Option<usize> = None;
@@ -53,14 +66,14 @@ fn lanes(diagram: &mut Diagram, group: usize, steps: &[PlannedStep]) {
             }
             lane
         });
-        let mut node = DiagramNode::new(format!("step{}", diagram.nodes.len()), short(&step.step.to_string(), 46));
+        let mut node = DiagramNode::new(format!("step{}", diagram.nodes.len()), short(&said(&step.step), 46));
         node.parent = Some(lane);
         node.tone = match step.reversibility {
             Reversibility::Exact => Tone::Good,
             Reversibility::Compensated => Tone::Care,
             Reversibility::Irreversible => Tone::Bad,
         };
-        let undo: Vec<String> = step.undo.steps().iter().map(ToString::to_string).collect();
+        let undo: Vec<String> = step.undo.steps().iter().map(said).collect();
         if step.reversibility == Reversibility::Irreversible {
             node.lines.push("cannot be undone".to_owned());
         } else if !undo.is_empty() {

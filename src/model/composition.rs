@@ -1,8 +1,9 @@
 //! A deployment with its subsystems (semantics: *Composition*): who is where.
 
-use super::deployment::{Deployment, Subsystem};
+use super::deployment::{Coordinator, Deployment, Subsystem};
 use super::names::{EventName, Ident};
 use super::subsystem::{IGNORED, SubsystemStanding};
+use super::within::Within;
 
 impl Deployment {
     /// All subsystems to any depth, with their paths from here, parents before their children.
@@ -21,6 +22,16 @@ impl Deployment {
         let (first, rest) = path.split_once('/').map_or((path, None), |(first, rest)| (first, Some(rest)));
         let found = self.subsystems.iter().find(|subsystem| subsystem.name.as_str() == first)?;
         rest.map_or(Some(found), |rest| found.own.subsystem(rest))
+    }
+
+    /// A coordinator of it, or of a subsystem, by the names of its own file.
+    pub fn in_its_file<'a>(&'a self, coordinator: &'a Coordinator) -> &'a Coordinator {
+        let Some((path, file)) = coordinator.of.and_then(|path| Some((path, self.subsystem(path.as_str())?))) else {
+            return coordinator;
+        };
+        let within = Within { path, activities: &file.activities };
+        let own = file.own.coordinators.iter().filter(|own| own.of.is_none());
+        own.into_iter().find(|own| within.coordinator_name(own) == coordinator.name).unwrap_or(coordinator)
     }
 
     /// The path of the subsystem in whose file something of that name stands, the innermost; none: in the deployment's own.

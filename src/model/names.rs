@@ -154,6 +154,17 @@ macro_rules! scoped {
 
 scoped!(Ident, ComponentName, TypeName, ConfigId, EventName);
 
+/// How many levels below the top the subsystem of that path is: 0 the deployment itself, whose path is empty.
+pub fn level(path: &str) -> usize {
+    if path.is_empty() { 0 } else { 1 + path.matches('/').count() }
+}
+
+/// The outermost subsystem on a path that is more than `depth` levels deep: what it is folded into. None: it is not that deep.
+pub fn folded_into(path: &str, depth: usize) -> Option<&str> {
+    let ends = path.match_indices('/').map(|(at, _)| at).chain([path.len()]);
+    ends.filter(|end| *end > 0).nth(depth).map(|end| &path[..end])
+}
+
 impl Ident {
     /// The name without the path of a subsystem.
     pub fn last(&self) -> &'static str {
@@ -294,5 +305,16 @@ mod tests {
         assert!(EventName::new("e_done@root.a").is_ok());
         assert!(EventName::new("e b").is_err());
         assert_eq!(ComponentName::new("left/D").unwrap().prefix(), "left");
+    }
+
+    #[test]
+    fn what_is_deep_is_folded_into_the_first_that_is_too_deep() {
+        assert_eq!([level(""), level("left"), level("left/arm")], [0, 1, 2]);
+        let of = |path, depth| folded_into(path, depth);
+        assert_eq!(
+            [of("left/arm/hand", 0), of("left/arm/hand", 1), of("left/arm", 2)],
+            [Some("left"), Some("left/arm"), None]
+        );
+        assert_eq!([of("", 0), of("left", 0), of("left", 1)], [None, Some("left"), None]);
     }
 }

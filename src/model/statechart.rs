@@ -40,20 +40,22 @@ impl Statechart {
 
     /// The events that transitions wait for, as often as they are listed.
     pub fn waited_for(&self) -> Vec<EventName> {
-        fn collect(state: &State, all: &mut Vec<EventName>) {
-            for (trigger, _) in state.transitions.iter().flat_map(|transition| &transition.events) {
-                if let Trigger::Event(event) = trigger {
-                    all.push(*event);
-                }
-            }
-            for child in &state.children {
-                if let ChartNode::State(child) = child {
-                    collect(child, all);
-                }
-            }
-        }
         let mut all = Vec::new();
-        collect(&self.root, &mut all);
+        self.root.for_each(&mut |state| {
+            let triggers = state.transitions.iter().flat_map(|transition| &transition.events);
+            all.extend(triggers.filter_map(|(of, _)| if let Trigger::Event(event) = of { Some(*event) } else { None }));
+        });
+        all
+    }
+
+    /// The names that it raises, as often as they are listed.
+    pub fn raised(&self) -> Vec<EventName> {
+        let mut all = Vec::new();
+        self.root.for_each(&mut |state| {
+            let effects = state.transitions.iter().flat_map(|transition| &transition.effect);
+            let actions = state.entry.iter().chain(effects).chain(&state.exit);
+            all.extend(actions.filter_map(|(of, _)| if let Action::Raise(name) = of { Some(*name) } else { None }));
+        });
         all
     }
 
@@ -125,6 +127,16 @@ impl State {
                 ChartNode::State(state) => state.is_pure(),
                 ChartNode::Connector(_) => true,
             })
+    }
+
+    /// Goes through it and the states inside, outer ones first.
+    fn for_each<'a>(&'a self, f: &mut impl FnMut(&'a Self)) {
+        f(self);
+        for child in &self.children {
+            if let ChartNode::State(state) = child {
+                state.for_each(f);
+            }
+        }
     }
 
     /// Whether something is so of it or of a state inside.

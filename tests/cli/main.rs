@@ -17,6 +17,7 @@ mod faults;
 mod force;
 mod foreground;
 mod foreign;
+mod hierarchy;
 mod hot_swap;
 mod kept;
 mod lies;
