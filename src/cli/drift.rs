@@ -1,6 +1,7 @@
 //! `davit drift`
 
 use super::exit::Exit;
+use super::inside::Inside;
 use super::output::Style;
 use super::remote::{Patience, WITHIN, connect, failure, seconds};
 use super::status::text;
@@ -17,6 +18,8 @@ pub struct Args {
     /// The running deployment's name; not needed while only one runs.
     #[arg(value_parser = super::remote::deployment_name)]
     name: Option<String>,
+    #[command(flatten)]
+    inside: Inside,
     #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = seconds, help = WITHIN)]
     within: f64,
     /// Print JSON: an array with one object a difference.
@@ -37,6 +40,13 @@ impl Args {
         let patience = Patience::within(self.within);
         let mut client = connect(self.name.as_deref())?;
         let drift = client.call("drift", &json!({ "within_s": self.within }), patience.left()).map_err(failure)?;
+        let drift = match (self.inside.is_some(), drift.as_array()) {
+            (true, Some(all)) => {
+                let status = client.call("status", &json!({}), patience.left()).map_err(failure)?;
+                self.inside.in_status(&status)?.map_or(Json::Null, |region| region.differences(all))
+            }
+            _ => drift,
+        };
         let differences = drift.as_array().map_or(&[][..], Vec::as_slice);
         let exit = if differences.is_empty() { Exit::Done } else { Exit::No };
         if self.json {
