@@ -378,3 +378,36 @@ pub(super) fn scopes(deployment: &Deployment) -> Vec<(Ident, Vec<Requester>)> {
     };
     deployment.all_subsystems().into_iter().map(|(path, _)| (path, inside(path))).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_subsystem_stands_as_was_told_last_but_on_its_way() {
+        let (up, down) = (Some(SubsystemStanding::Up), Some(SubsystemStanding::Down));
+        let life = |told, up_until: Option<u64>, down_until: Option<u64>| SubsystemLife {
+            told,
+            up_until: up_until.map(Time),
+            down_until: down_until.map(Time),
+            empty: false,
+        };
+        let failed = Some(SubsystemStanding::Failed);
+        let stranded = Some(SubsystemStanding::Stranded);
+        for (told, up_until, down_until, word) in [
+            (down, None, None, "down"),
+            (None, Some(5), None, "deploying"),
+            (up, None, None, "up"),
+            // A bring-up that is late is told of while it goes on.
+            (failed, Some(5), None, "failed"),
+            (up, None, Some(9), "shutting_down"),
+            (failed, None, Some(9), "shutting_down"),
+            (None, None, Some(9), "shutting_down"),
+            (stranded, None, Some(9), "stranded"),
+            // Begun anew.
+            (stranded, Some(5), None, "deploying"),
+        ] {
+            assert_eq!(life(told, up_until, down_until).standing(), word, "{told:?} {up_until:?} {down_until:?}");
+        }
+    }
+}

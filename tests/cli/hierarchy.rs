@@ -267,7 +267,8 @@ fn a_log_is_that_of_a_subsystem_also_when_nobody_runs_any_more() {
         let ran = cell.0.run(&["log", "cell", "--in", "duo/left", "--json"]);
         (ran.code == 0).then(|| ran.json())
     }));
-    assert_eq!(dead[1..], all, "of what was kept, behind that it began");
+    // What was told before somebody kept it is not there.
+    assert!(dead[0].starts_with("began") && dead.ends_with(&inside.map(str::to_owned)), "{dead:?}");
     let typo = cell.0.run(&["log", "cell", "--in", "duo/lef"]);
     assert!(typo.code == 2 && typo.err.contains("did you mean `duo/left`?"), "{}", typo.err);
 }
