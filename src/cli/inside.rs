@@ -146,13 +146,15 @@ fn names_of(text: &str) -> Vec<usize> {
     std::iter::once(first).chain(arrows).collect()
 }
 
+/// One of that path, for tests.
+#[cfg(test)]
+pub fn region(path: &str) -> Region {
+    Region { path: path.to_owned() }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn region(path: &str) -> Region {
-        Region { path: path.to_owned() }
-    }
 
     #[test]
     fn names_inside_are_those_of_the_file_and_outside_those_from_the_root() {

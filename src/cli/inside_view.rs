@@ -206,3 +206,47 @@ pub fn paths_named(entries: &[Json]) -> Vec<String> {
 pub fn innermost<'a>(paths: impl IntoIterator<Item = &'a str>, name: &str) -> &'a str {
     paths.into_iter().filter(|path| is_within(name, path)).max_by_key(|path| path.len()).unwrap_or_default()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cli::inside::region;
+
+    #[test]
+    fn what_is_wrong_in_a_subsystem_is_seen_there_by_its_own_names() {
+        let duo = region("duo");
+        let status = json!({
+            "subsystems": [], "stack": [], "system": null,
+            "outstanding": ["duo/kin/go by duo/kin", "undo by duo", "join by cell"],
+            "residual": [
+                { "do": "connect", "target": "duo/A.u", "from": "Net.y", "to": "duo/A.u", "text": "connect Net.y -> duo/A.u (data)" },
+                { "how": "faulted", "target": "duo/A", "text": "duo/A is faulted" },
+                { "how": "faulted", "target": "Net", "text": "Net is faulted" },
+            ],
+            "faults": [{ "component": "duo/A", "reason": "`duo/A` is hot" }, { "component": "Net", "reason": "gone" }],
+        });
+        let seen = duo.status(&status);
+        assert_eq!(seen["outstanding"], json!(["kin/go by kin", "undo by duo"]));
+        let said: Vec<&str> = seen["residual"].as_array().unwrap().iter().map(|one| text(&one["text"])).collect();
+        assert_eq!(said, ["connect /Net.y -> A.u (data)", "A is faulted"]);
+        assert_eq!(seen["residual"][0]["from"], "/Net.y");
+        assert_eq!(seen["faults"], json!([{ "component": "A", "reason": "`duo/A` is hot" }]));
+        assert_eq!((&seen["system"], &seen["standing"]), (&Json::Null, &Json::Null));
+    }
+
+    #[test]
+    fn activities_of_a_parent_are_shown_where_they_update_something() {
+        let duo = region("duo");
+        let component =
+            |activity: &str| json!({ "activity": activity, "type": "duo/davit.Monitors", "state": "running" });
+        let look = json!({
+            "status": { "system": { "components": { "duo/A": component("control"), "duo/B": component("duo/own"), "C": component("net") } } },
+            "monitors": [{ "name": "high", "component": "duo/A" }, { "name": "low", "component": "C" }],
+            "activities": [{ "name": "control" }, { "name": "duo/own" }, { "name": "net" }],
+        });
+        let seen = duo.look(&look);
+        assert_eq!(seen["activities"], json!([{ "name": "/control" }, { "name": "own" }]));
+        assert_eq!(seen["monitors"], json!([{ "name": "high", "component": "A" }]));
+        assert_eq!(seen["status"]["system"]["components"]["A"]["type"], "davit.Monitors");
+    }
+}

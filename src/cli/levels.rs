@@ -139,3 +139,70 @@ pub fn states(part: &FilePart<'_>) -> String {
     let state = |(name, it): &(&str, &Json)| if several { format!("{name}:{}", leaf(it)) } else { leaf(it).to_owned() };
     part.coordinators.iter().map(state).collect::<Vec<_>>().join(", ")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cli::output::Color;
+    use serde_json::json;
+
+    /// A deployment in whose deepest subsystem everything is wrong.
+    fn status() -> Json {
+        let frame = |configuration: &str, lost: bool| json!({ "configuration": configuration, "lost": lost });
+        json!({
+            "coordinators": { "cell": ["root", "root.on"], "duo": ["root"], "duo/arm": ["root.hurt"], "duo/hand": [] },
+            "subsystems": [
+                { "name": "duo", "standing": "up", "coordinators": ["duo"] },
+                { "name": "duo/kin", "standing": "failed", "coordinators": ["duo/arm", "duo/hand"] },
+            ],
+            "outstanding": ["duo/kin/go by duo/arm", "undo by duo/hand", "join by cell"],
+            "stack": [frame("duo/kin/make", true), frame("duo/join", false), frame("own", false)],
+            "system": { "components": { "duo/kin/Drive": { "state": "faulted" }, "Net": { "state": "running" } } },
+            "residual": [{ "target": "duo/kin/Drive.k", "text": "t" }],
+            "faults": [{ "component": "duo/kin/Drive", "reason": "hot" }],
+        })
+    }
+
+    #[test]
+    fn what_is_of_each_file_is_found() {
+        let status = status();
+        let parts = parts(&status);
+        let own: Vec<Json> = parts
+            .iter()
+            .map(|part| {
+                json!([
+                    part.path,
+                    states(part),
+                    part.waiting,
+                    part.frames.len(),
+                    part.components.len(),
+                    part.faults.len()
+                ])
+            })
+            .collect();
+        let kin = "duo/arm:root.hurt, duo/hand:(inactive)";
+        let waiting = ["duo/kin/go by duo/arm", "undo by duo/hand"];
+        let expected = [
+            json!(["", "root.on", ["join by cell"], 1, 1, 0]),
+            json!(["duo", "root", [], 1, 0, 0]),
+            json!(["duo/kin", kin, waiting, 1, 1, 1]),
+        ];
+        assert_eq!(own, expected);
+    }
+
+    #[test]
+    fn a_line_says_whatever_is_wrong_in_it_however_deep() {
+        let status = status();
+        let parts = parts(&status);
+        let mut page = String::new();
+        let out = Output::new(Color::Never);
+        let line = |lines: &[&FilePart<'_>]| folded(&out, &parts, lines, true).to_string();
+        each(&parts, Some(0), &mut page, |part| format!("[{}]\n", part.path), line);
+        let duo = "duo  up  root  2 frames  1 component  1 fault, 1 difference, 1 loss, waiting for duo/kin/go by duo/arm, undo by duo/hand\n";
+        assert_eq!(page, format!("[]\n{duo}"));
+        let mut page = String::new();
+        let unknown = |lines: &[&FilePart<'_>]| folded(&out, &parts, lines, false).to_string();
+        each(&parts, Some(1), &mut page, |part| format!("[{}]\n", part.path), unknown);
+        assert!(page.starts_with("[]\n[duo]\nduo/kin  failed") && page.contains("not known"), "{page}");
+    }
+}

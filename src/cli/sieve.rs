@@ -81,3 +81,40 @@ impl Sieve {
         level(path) > depth && !(entry["what"] == "answered" && entry["ok"] == false)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn what_goes_wrong_inside_is_told_folded_and_what_is_only_done_there_is_not() {
+        let sieve = Sieve { region: None, depth: Some(0), paths: ["duo", "duo/kin"].map(str::to_owned).to_vec() };
+        let told = |entry: Json| sieve.pass(&entry).is_some();
+        let asked = |what: &str, ask: &str, ok: bool| json!({ "what": what, "ask": ask, "by": "duo/kin", "ok": ok });
+        for kept in [
+            json!({ "what": "fault", "component": "duo/kin/Drive" }),
+            json!({ "what": "lost", "event": "duo/kin/hold.lost" }),
+            asked("answered", "duo/kin/make", false),
+            asked("answered", "undo", false),
+            asked("answered", "own", true),
+            json!({ "what": "event", "event": "duo/up", "from": "duo" }),
+            json!({ "what": "emitted", "event": "duo/e_start" }),
+            json!({ "what": "state", "active": ["cell:root"] }),
+            json!({ "what": "phase", "phase": "up" }),
+        ] {
+            assert!(told(kept.clone()), "{kept}");
+        }
+        for folded in [
+            asked("requested", "duo/make", true),
+            asked("answered", "duo/kin/make", true),
+            asked("requested", "undo", true),
+            json!({ "what": "event", "event": "duo/kin/up", "from": "duo/kin" }),
+            json!({ "what": "event", "event": "duo/e_hot", "from": "duo/Drive" }),
+            json!({ "what": "emitted", "event": "duo/kin/e_start" }),
+            json!({ "what": "state", "active": ["duo/kin:root"] }),
+        ] {
+            assert!(!told(folded.clone()), "{folded}");
+        }
+    }
+}
