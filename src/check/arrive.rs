@@ -7,7 +7,7 @@ use super::shared_list::SharedList;
 use super::state::{Answers, Failed, Interrupted, Move, Next, Nexts, ProductState, States, bit, index, one};
 use crate::limits;
 use crate::model::{Ask, ConfigId, EventName, Findings, Verdict, codes};
-use crate::stack::{ActiveBatch, Arrived, Batch, Request, Requester, Why, given_up_of};
+use crate::stack::{ActiveBatch, Arrived, Batch, Desk, Request, Requester, Why, given_up_of};
 use crate::statechart::{EventId, NodeId};
 use smallvec::SmallVec;
 use std::rc::Rc;
@@ -218,10 +218,12 @@ impl Product<'_> {
         state
     }
 
-    /// A safe configuration interrupts what is under way.
+    /// A safe configuration interrupts what is under way in its (sub)system.
     fn interrupts(&self, state: &mut ProductState, request: Request) {
+        let Ask::Apply(safe) = request.ask else { return };
         for active in state.desk.under_way() {
-            if state.interrupted.iter().all(|of| of.number != active.number) {
+            let reached = self.worlds.claims.interrupts(safe, &active.batch.requests);
+            if reached && state.interrupted.iter().all(|of| of.number != active.number) {
                 let (number, given_up) = (active.number, active.given_up.len());
                 state.interrupted.push(Interrupted { number, planned: state.world, given_up });
             }
@@ -293,22 +295,22 @@ impl Product<'_> {
 
     /// The next batch that may begin does: its number.
     fn begin_next(&self, state: &mut ProductState) -> Option<u32> {
-        let ProductState { desk, world, leaving, .. } = state;
+        let ProductState { desk, world, leaving, safe, .. } = state;
         let alone = |batch: &Batch| *leaving && self.worlds.goes_alone(*world, batch);
-        if desk.waiting().any(alone) {
-            return self
-                .desks
-                .change(desk, |desk| desk.begin_next(&self.worlds.claims, alone).map(|active| active.number));
+        if desk.waiting().any(alone) || !safe.is_empty() {
+            let asked = safe.iter().map(|request| request.ask);
+            let safe: Vec<ConfigId> =
+                asked.filter_map(|ask| if let Ask::Apply(id) = ask { Some(id) } else { None }).collect();
+            let begin =
+                |desk: &mut Desk| desk.begin_next(&self.worlds.claims, alone, &safe).map(|active| active.number);
+            return self.desks.change(desk, begin);
         }
         desk.waiting().next()?;
         self.desks.begin_next(desk, &self.worlds.claims)
     }
 
-    /// Whatever can begin does; nothing while a safe configuration is being applied.
+    /// Whatever can begin does; nothing of a (sub)system of which a safe configuration is being applied.
     pub(super) fn begin(&mut self, state: &mut ProductState) {
-        if !state.safe.is_empty() {
-            return;
-        }
         while let Some(number) = self.begin_next(state) {
             let begun = state.desk.clone();
             let Some(ActiveBatch { batch, .. }) = begun.active(number) else { continue };

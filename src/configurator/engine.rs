@@ -158,15 +158,13 @@ impl Engine {
                 continue;
             }
             let mut did = self.serve_safe();
-            if !self.running.iter().any(Running::is_safe) {
-                while !self.waits_for_a_look()
-                    && let Some(number) = self.begin_next()
-                {
-                    did = true;
-                    self.begin(number);
-                    if self.urgent() {
-                        break;
-                    }
+            while !self.waits_for_a_look()
+                && let Some(number) = self.begin_next()
+            {
+                did = true;
+                self.begin(number);
+                if self.urgent() {
+                    break;
                 }
             }
             did |= self.advance_all();
@@ -204,9 +202,10 @@ impl Engine {
     /// The next batch that may begin, by its number.
     pub fn begin_next(&mut self) -> Option<u32> {
         self.heed_leaving();
-        let Self { desk, given, world, leaving, .. } = self;
+        let Self { desk, given, world, leaving, running, .. } = self;
+        let safe: SmallVec<[ConfigId; 1]> = running.iter().filter_map(Running::safe_configuration).collect();
         let alone = |batch: &Batch| leaving.is_some() && world.stack.goes_alone(batch);
-        desk.begin_next(&given.claims, alone).map(|active| active.number)
+        desk.begin_next(&given.claims, alone, &safe).map(|active| active.number)
     }
 
     /// Takes in what has come, waiting for something until `until`.

@@ -2,7 +2,7 @@
 
 use super::inbox::PoolTicket;
 use crate::limits;
-use crate::model::RequestId;
+use crate::model::{Ask, ConfigId, RequestId};
 use crate::platform::{Platform, StepBatch};
 use crate::stack::{Frame, FrameId, Group, Request};
 use crate::time::Time;
@@ -106,6 +106,22 @@ impl Running {
 
     pub fn is_safe(&self) -> bool {
         matches!(self.purpose, Purpose::Safe(_))
+    }
+
+    /// The safe configuration that it applies.
+    pub fn safe_configuration(&self) -> Option<ConfigId> {
+        match &self.purpose {
+            Purpose::Safe(safe) => match safe.0.ask {
+                Ask::Apply(id) => Some(id),
+                _ => None,
+            },
+            _ => None,
+        }
+    }
+
+    /// Whether a safe configuration has interrupted it, and it is not over.
+    pub fn is_interrupted(&self) -> bool {
+        !self.is_safe() && !self.over && self.machine.is_interrupted()
     }
 
     /// When something must be looked at again, if nothing comes.

@@ -105,11 +105,21 @@ impl Engine {
         before.flat_map(|other| other.machine.open_steps()).flat_map(touch::components).collect()
     }
 
-    /// Interrupts what is under way; the picture without it, if it has done anything.
+    /// Whether a safe configuration interrupts what is under way here: what claims something of its (sub)system, and whatever
+    /// nobody asked for.
+    fn is_reached(&self, id: ConfigId, running: &Running) -> bool {
+        let requests = match &running.purpose {
+            Purpose::Requests(number, _) => self.desk.active(*number).map(|active| &active.batch.requests),
+            Purpose::Safe(_) | Purpose::Own => None,
+        };
+        requests.is_none_or(|requests| self.given.claims.interrupts(id, requests))
+    }
+
+    /// Interrupts what is under way in the (sub)system of a safe configuration; the picture without it, if it has done anything.
     fn interrupt(&mut self, id: ConfigId) -> Option<System> {
-        let meets = |running: &Running| !running.is_safe() && !running.over;
         for at in 0..self.running.len() {
-            if meets(&self.running[at]) {
+            let running = &self.running[at];
+            if !running.is_safe() && !running.over && self.is_reached(id, running) {
                 self.running[at].machine.on(Input::Interrupt(id), &mut self.world.system);
                 // Calls that are out are told first, and what is back is taken in.
                 self.running[at].stop_batches(&*self.given.platform);
@@ -124,7 +134,7 @@ impl Engine {
             }
         }
         let mut before: Option<System> = None;
-        for running in self.running.iter().filter(|running| meets(running) && running.machine.did_anything()) {
+        for running in self.running.iter().filter(|r| r.is_interrupted() && r.machine.did_anything()) {
             running.machine.take_out(before.get_or_insert_with(|| self.world.system.clone()), &touched);
         }
         before
@@ -150,8 +160,7 @@ impl Engine {
             broken = Some(part);
         }
         // Planned as if that had never been.
-        let interrupted =
-            !self.world.broken.is_empty() || self.running.iter().any(|running| !running.is_safe() && !running.over);
+        let interrupted = !self.world.broken.is_empty() || self.running.iter().any(Running::is_interrupted);
         let held = self.held_frames();
         let failed = broken.as_ref().map(|part| part.frame.as_ref());
         let how = SafeEnd { failed, missed: &missed, left_out: !troubles.is_empty(), interrupts: interrupted };
@@ -207,7 +216,7 @@ impl Engine {
             return;
         }
         let touched = std::mem::take(&mut self.safety.touched);
-        for running in self.running.iter_mut().filter(|running| !running.is_safe() && !running.over) {
+        for running in self.running.iter_mut().filter(|running| running.is_interrupted()) {
             running.machine.on(Input::Release(touched.clone()), &mut self.world.system);
         }
     }

@@ -356,11 +356,16 @@ fn foreign(frames: &[Arc<super::Frame>], request: &Request) -> Option<ConfigId> 
     if request.force { None } else { frames.iter().find(others).map(|frame| frame.configuration) }
 }
 
-/// Whether nothing may move for a request, since a safe configuration is in force: only what a coordinator asks for in a
+/// Whether nothing may move for a request, since a safe configuration of its (sub)system is in force: only what a coordinator asks for in a
 /// later step may, or what is forced.
 pub fn keeps_still(world: &World, request: &Request) -> bool {
     let foreign = request.requester == Requester::Operator || request.why != Why::Asked;
-    request.still || foreign && !request.force && world.stack.safe().next().is_some()
+    let still = || match request.ask {
+        Ask::Apply(id) | Ask::UndoOf(id) => world.stack.keeps_still(id),
+        // Whose frames these are is not known from the text.
+        Ask::Undo | Ask::UndoTo(_) | Ask::Commit { .. } => world.stack.safe().next().is_some(),
+    };
+    request.still || foreign && !request.force && still()
 }
 
 /// The part of a plan that must not be carried out now, and why: it needs a component in quarantine, or something would

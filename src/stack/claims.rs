@@ -127,6 +127,22 @@ impl Claims {
         self.numbers.keys().copied()
     }
 
+    /// Whether a safe configuration interrupts requests of one batch: one of them claims something of its (sub)system, or belongs
+    /// to it without claiming anything.
+    pub fn interrupts<'r>(&self, safe: ConfigId, requests: impl IntoIterator<Item = &'r Request> + Clone) -> bool {
+        let path = safe.prefix();
+        let belongs = |request: &Request| match request.ask {
+            Ask::Apply(id) | Ask::UndoOf(id) => is_of_system(safe, id),
+            Ask::Undo | Ask::UndoTo(_) | Ask::Commit { .. } => true,
+        };
+        path.is_empty() || requests.clone().into_iter().any(belongs) || {
+            let mut inside = Claim::default();
+            let names = self.numbers.iter().filter(|(name, _)| is_within(name.prefix(), path));
+            names.for_each(|(_, at)| inside.set(*at));
+            inside.meets(&self.of(requests))
+        }
+    }
+
     /// What requests claim together. A configuration that is not there claims nothing.
     pub fn of<'r>(&self, requests: impl IntoIterator<Item = &'r Request>) -> Claim {
         let mut claim = Claim::default();
@@ -143,6 +159,15 @@ impl Claims {
         }
         claim
     }
+}
+
+/// Whether a configuration belongs to the (sub)system of another one, or to one inside it.
+pub fn is_of_system(of: ConfigId, id: ConfigId) -> bool {
+    is_within(id.prefix(), of.prefix())
+}
+
+fn is_within(path: &str, outer: &str) -> bool {
+    outer.is_empty() || path.strip_prefix(outer).is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
 }
 
 /// Calls `f` with the components that a configuration names; one may come more than once.

@@ -4,7 +4,7 @@
 //! the same coordinator, or of the same connection of an operator, is over. Then it has all of that until its last request is answered. So no cycle of waits can
 //! arise, and none starves.
 
-use super::claims::{Claim, Claims};
+use super::claims::{Claim, Claims, is_of_system};
 use super::request::{Batch, Request, Requester, Why};
 use super::{Reason, answer};
 use crate::model::{Ask, ConfigId, Verdict};
@@ -187,13 +187,19 @@ impl Desk {
         gone
     }
 
-    /// The next batch that may begin; it is under way from now on. `alone` says which would begin alone.
-    pub fn begin_next(&mut self, claims: &Claims, alone: impl Fn(&Batch) -> bool) -> Option<&ActiveBatch> {
-        let at = if self.under_way.is_empty() {
+    /// The next batch that may begin; it is under way from now on. `alone` says which would begin alone, `safe` are the safe
+    /// configurations that are being applied: what they would interrupt waits for them.
+    pub fn begin_next(
+        &mut self,
+        claims: &Claims,
+        alone: impl Fn(&Batch) -> bool,
+        safe: &[ConfigId],
+    ) -> Option<&ActiveBatch> {
+        let at = if self.under_way.is_empty() && safe.is_empty() {
             // Whatever else waits came later.
             (!self.waiting.is_empty()).then_some(0)
         } else {
-            self.free(claims, &alone)
+            self.free(claims, &alone, safe)
         }?;
         let batch = self.waiting.remove(at)?;
         let number = (0..).find(|n| self.under_way.iter().all(|active| active.number != *n))?;
@@ -202,7 +208,7 @@ impl Desk {
         self.under_way.last()
     }
 
-    fn free(&self, claims: &Claims, alone: impl Fn(&Batch) -> bool) -> Option<usize> {
+    fn free(&self, claims: &Claims, alone: impl Fn(&Batch) -> bool, safe: &[ConfigId]) -> Option<usize> {
         let mut held = claims.of(self.under_way.iter().flat_map(|active| &active.batch.requests));
         if self.under_way.iter().any(|active| active.alone) {
             held.join(&Claim::all());
@@ -210,7 +216,8 @@ impl Desk {
         let mut asking: Vec<Line> = self.under_way.iter().filter_map(|active| line(&active.batch)).collect();
         for (at, batch) in self.waiting.iter().enumerate() {
             let claim = if alone(batch) { Claim::all() } else { claims.of(&batch.requests) };
-            if !claim.meets(&held) && line(batch).is_none_or(|by| !asking.contains(&by)) {
+            let waits = || safe.iter().any(|safe| claims.interrupts(*safe, &batch.requests));
+            if !claim.meets(&held) && line(batch).is_none_or(|by| !asking.contains(&by)) && !waits() {
                 return Some(at);
             }
             held.join(&claim);
@@ -345,14 +352,9 @@ fn takes_back(undo: &Request, request: &Request, id: ConfigId) -> bool {
 
 /// Whether a request belongs to the (sub)system of a safe configuration.
 fn concerns(safe: ConfigId, request: &Request) -> bool {
-    let prefix = safe.prefix();
-    let inside = |id: ConfigId| {
-        let own = id.prefix();
-        prefix.is_empty() || own == prefix || own.strip_prefix(prefix).is_some_and(|rest| rest.starts_with('/'))
-    };
     match (request.why, request.ask) {
-        (Why::Asked, Ask::Apply(id) | Ask::UndoOf(id)) => inside(id),
-        (Why::Asked, _) => prefix.is_empty(),
+        (Why::Asked, Ask::Apply(id) | Ask::UndoOf(id)) => is_of_system(safe, id),
+        (Why::Asked, _) => safe.prefix().is_empty(),
         _ => false,
     }
 }

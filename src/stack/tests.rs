@@ -427,7 +427,7 @@ fn what_has_given_up_a_request_goes_with_its_answer() {
     let under_way = || {
         let mut desk = super::Desk::default();
         let _ = desk.arrive((0..3).map(apply).collect(), |_| false, &claims);
-        let number = desk.begin_next(&claims, |_| false).expect("nothing is in its way").number;
+        let number = desk.begin_next(&claims, |_| false, &[]).expect("nothing is in its way").number;
         assert_eq!([1, 2, 1].map(|n| desk.give_up(number, undo(n))), [Some(1), Some(2), Some(1)]);
         (desk, number)
     };

@@ -483,3 +483,63 @@ fn a_safe_configuration_does_not_wait_for_a_look() {
     assert_eq!(rig.events()[5..], ["five.ok"]);
     rig.each_answered_once();
 }
+
+/// Two subsystems of one component each, and their parent's connection across.
+fn two_subsystems() -> Rig {
+    let mut all = vec![configuration("join", "", "connect left/A.y right/A.u; set right/A.k 9", "")];
+    for path in ["left", "right"] {
+        all.extend([
+            configuration(&format!("{path}/make"), "", &format!("create {path}/A"), &format!("{path}/A:running")),
+            configuration(&format!("{path}/gain"), "", &format!("set {path}/A.k 1"), ""),
+            configuration(&format!("{path}/quiet"), &format!("{path}/A:stopped"), "", ""),
+        ]);
+    }
+    for configuration in &mut all {
+        configuration.safe = configuration.id.as_str().ends_with("quiet");
+    }
+    let rig = Rig::new(all);
+    for path in ["left", "right"] {
+        assert_eq!(rig.ask_as(&format!("{path}/make"), coordinator(path)), [format!("{path}/make.ok")]);
+    }
+    rig
+}
+
+#[test]
+fn that_of_a_subsystem_interrupts_what_claims_something_of_it_and_nothing_else() {
+    let rig = two_subsystems();
+    rig.platform.set_delays(slow("property_set right/A.k", 0.8));
+    rig.submit_as("right/gain", coordinator("right")).unwrap();
+    rig.wait(0.1);
+    rig.submit_as("left/quiet", coordinator("left")).unwrap();
+    rig.wait(0.05);
+    assert_eq!(rig.events()[2..], ["left/quiet.ok"]);
+    rig.wait(50.0);
+    assert_eq!(rig.events()[3..], ["right/gain.ok"], "it goes on, and is not cut short");
+    assert_eq!(rig.ask_as("left/quiet.undo right/gain.undo", coordinator("left")).len(), 2);
+    // Of the parent's, both: its part elsewhere is taken back with it.
+    rig.submit_as("join", coordinator("parent")).unwrap();
+    rig.wait(0.1);
+    rig.submit_as("left/quiet", coordinator("left")).unwrap();
+    rig.wait(50.0);
+    assert_eq!(rig.events()[6..], ["left/quiet.ok", "join.failed"]);
+    assert_eq!(rig.see().components[&name("right/A")].properties[&ident("k")], Value::Float(1.0), "as it was made");
+    rig.in_step();
+    rig.each_answered_once();
+}
+
+#[test]
+fn while_that_of_a_subsystem_is_applied_others_begin() {
+    let rig = two_subsystems();
+    rig.platform.set_delays(slow("stop left/A", 0.8));
+    rig.submit_as("left/quiet", coordinator("left")).unwrap();
+    rig.wait(0.1);
+    // Behind it: its own waits, the other one's does not.
+    rig.submit_as("left/gain", coordinator("other")).unwrap();
+    rig.submit_as("right/gain", coordinator("right")).unwrap();
+    rig.wait(0.05);
+    assert_eq!(rig.events()[2..], ["right/gain.ok"]);
+    rig.wait(50.0);
+    assert_eq!(rig.events()[3..], ["left/quiet.ok", "left/gain.ok"]);
+    rig.in_step();
+    rig.each_answered_once();
+}
