@@ -31,7 +31,8 @@ local degraded = all { settled, no(good) }
 
 local force = "Cart_Impedance.f_raw_norm"
 local heard = no(silent(force, 0.2))
-local near  = all { heard, below(force, 2.0) }:for_at_least(0.3)
+-- Near counts where the drives take torques: a robot that is stopped is not about to couple.
+local near  = all { heard, below(force, 2.0), equals("youbot.control_mode", 6) }:for_at_least(0.3)
 local peer  = "Link_Rx.peer_state"
 
 -- The fastest joint, in rad/s.

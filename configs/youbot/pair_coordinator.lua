@@ -38,9 +38,13 @@ return state {
   -- They could not be: nothing is taken away under them. `e_shutdown` tries again.
   tied = state {},
 
+  -- One that was stopped on its way waits to be asked once more; whoever is down already has nothing to do.
   lowering = state { entry = { "left/e_shutdown", "right/e_shutdown" },
     going = both("down"),
-    trans { src = "initial", tgt = "going" },
+    trans { src = "initial",        tgt = "going" },
+    trans { src = ".going.neither", tgt = ".going.neither", events = { "e_shutdown" }, effect = { "left/e_shutdown", "right/e_shutdown" } },
+    trans { src = ".going.left",    tgt = ".going.left",    events = { "e_shutdown" }, effect = "right/e_shutdown" },
+    trans { src = ".going.right",   tgt = ".going.right",   events = { "e_shutdown" }, effect = "left/e_shutdown" },
   },
 
   trans { src = "initial", tgt = "idle" },

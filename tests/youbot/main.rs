@@ -19,6 +19,7 @@ mod live;
 mod motion;
 mod passive;
 mod robot;
+mod scenarios;
 mod stops;
 mod two;
 mod variants;

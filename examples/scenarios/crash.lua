@@ -1,0 +1,52 @@
+-- What is in force dies while both robots copy:  davit run examples/scenarios/crash.lua --clock simulated
+--
+-- Its code panics, at a time of the clock. It is noticed, the drives brake and hold by themselves, and the other robot lets go. The
+-- impedance controller is started again without asking; what else is dead keeps the robot stopped, and it is led down all the same.
+
+local DEAD = {
+  { "Cart_Impedance", "e_controller_lost" },
+  { "Arm_Kinematics", "e_control_lost" },
+  { "Base_Ctrl",      "e_control_lost" },
+  { "Dynamics",       "e_cmd_watchdog" },
+  { "Monitors",       "e_watch_lost" },
+}
+
+for _, dead in ipairs(DEAD) do
+  local component, event = table.unpack(dead)
+  deploy("../../deployments/youbot_coupling.yaml")
+  wait_state("left:copying", 20)
+  wait_state("right:copying", 20)
+  set("left/Operator.script", "sway 600 0.042 0.042 0 0.15", { force = true, within = 1 })
+  wait(2)
+  wait_state("left:copying", 0)
+  local s = sample{ every = 0.001, name = component, signals = {
+    x = "left/World.robot1_tool_twist.v[0]", y = "left/World.robot1_tool_twist.v[1]", z = "left/World.robot1_tool_twist.v[2]" } }
+  local at = now() + 0.01
+  inject("left/" .. component, "panic", {}, at)
+  wait_answer("left/" .. event, 1)
+  expect{ name = component .. ": noticed after", value = 1000 * (now() - at), max = 50, unit = "ms" }
+  wait_state("left:fault", 0.01)
+  wait_answer("left/safe_hold.ok", 0.1)
+  expect{ name = component .. ": braking after", value = 1000 * (now() - at), max = 55, unit = "ms" }
+  if component == "Cart_Impedance" then
+    wait_state("left:operational", 1)
+    set("left/Operator.script", "align 8; free 600", { force = true, within = 1 })
+    wait_state("left:harmonizing", 1)
+    expect{ name = component .. ": harmonizing after", value = 1000 * (now() - at), max = 1000, unit = "ms" }
+    wait_state("left:copying", 10)
+  else
+    -- A controller that is back within a tenth of a second is waited for.
+    -- Monitors that are dead go on saying that the arms are near: the other one stays in `copying`, without a force.
+    if component ~= "Monitors" then
+      wait_state("right:harmonizing", 1)
+      expect{ name = component .. ": the other lets go after", value = 1000 * (now() - at), max = 500, unit = "ms" }
+    end
+    wait(at + 1 - now())
+    s:stop()
+    local x, y, z, rest = s:values("x"), s:values("y"), s:values("z"), 0
+    for i, t in ipairs(s:times()) do if t >= at + 0.35 then rest = math.max(rest, math.sqrt(x[i]^2 + y[i]^2 + z[i]^2)) end end
+    expect{ name = component .. ": 0.35 s later the tool moves with", value = rest, max = 0.02, unit = "m/s" }
+    wait_state("left:fault", 0)
+  end
+  shutdown()
+end

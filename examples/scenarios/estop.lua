@@ -1,0 +1,92 @@
+-- An emergency stop, in every state in which the drives have power:  davit run examples/scenarios/estop.lua --clock simulated
+--
+-- Both robots hear it at once; 0.3 s later both tools are at rest, and nothing moves until somebody resets. Then all of it goes
+-- down to nothing, and up again for the next state.
+
+deploy("../../deployments/youbot_coupling.yaml")
+
+local ROBOTS = { "left", "right" }
+local function both(event) for _, robot in ipairs(ROBOTS) do raise(robot .. "/" .. event) end end
+local function until_both(state, seconds) for _, robot in ipairs(ROBOTS) do wait_state(robot .. ":" .. state, seconds) end end
+local function stopped() raise("e_estop") wait(0.5) end
+local function go_down() raise("e_shutdown") end
+
+-- Where it is stopped, and how one comes there from the beginning of the bring-up.
+local PLACES = {
+  { "calibrating",             function() until_both("calibrating", 1) wait(0.06) end },
+  { "unfolding",               function() until_both("unfolding", 1) wait(2) end },
+  { "unsync",                  function() until_both("unsync", 6) wait(0.1) end },
+  { "harmonizing",             function() until_both("harmonizing", 7) wait(0.1) end },
+  { "copying with eight",      function() until_both("eight_DOF_mode", 20) wait(13.5) end },
+  { "copying with five",       function() until_both("copying", 20) both("e_5dof") until_both("five_DOF_mode", 0.01) wait(13.5) end },
+  { "soft stop",               function()
+      until_both("copying", 20)
+      set("left/Cart_Impedance.offset", { 0.3, 0, 0 }, { force = true, within = 1 })
+      wait_state("left:soft_stop", 0.1)
+    end },
+  { "parking",                 function() until_both("copying", 20) go_down() until_both("parking", 1) wait(1.8) end },
+  { "folding on the way back", function() until_both("unfolding", 1) wait(3) go_down() until_both("folding", 5) wait(1) end },
+  { "failed on the way up",    function() until_both("unfolding", 1) wait(1) stopped() both("e_reset") until_both("deploy_failed", 1) end },
+  { "stranded before parking", function()
+      until_both("unsync", 6) go_down() until_both("parking", 1) wait(1)
+      stopped() both("e_reset") until_both("before_parking", 1)
+    end },
+  -- Where it is stopped already an operator may insist on what moves: that is braked again.
+  { "stopped, and moved all the same", function()
+      until_both("copying", 20) stopped()
+      for _, robot in ipairs(ROBOTS) do apply(robot .. "/park", { force = true }) end
+      wait(1.5)
+    end, answer = "brake_again.ok" },
+}
+
+-- The fastest that a tool was from `since` on, in m/s; and the largest change of a torque in 1 ms, in N m.
+local function measured(s, since)
+  local fastest, step, times = 0, 0, s:times()
+  for _, robot in ipairs(ROBOTS) do
+    local x, y, z = s:values(robot .. "_x"), s:values(robot .. "_y"), s:values(robot .. "_z")
+    for i, at in ipairs(times) do
+      if at >= since then fastest = math.max(fastest, math.sqrt(x[i]^2 + y[i]^2 + z[i]^2)) end
+    end
+    for joint = 0, 4 do
+      local torque = s:values(robot .. "_torque_" .. joint)
+      for i = 2, #torque do step = math.max(step, math.abs(torque[i] - torque[i - 1])) end
+    end
+  end
+  return fastest, step
+end
+
+local worst = { heard = 0, speed = 0, step = 0 }
+for number, place in ipairs(PLACES) do
+  local name, go = table.unpack(place)
+  go_down()
+  wait_state("youbot_coupling:idle", 20)
+  assert(#stack() == 0, "something is left")
+  raise("e_start")
+  go()
+
+  local signals = {}
+  for _, robot in ipairs(ROBOTS) do
+    for i, axis in ipairs{ "x", "y", "z" } do
+      signals[robot .. "_" .. axis] = robot .. "/World.robot1_tool_twist.v[" .. i - 1 .. "]"
+    end
+    for joint = 0, 4 do signals[robot .. "_torque_" .. joint] = robot .. "/youbot.jointstate.eff[" .. joint .. "]" end
+  end
+  local s = sample{ every = 0.001, signals = signals, name = "place_" .. number }
+  wait(0.01)
+  local at = now()
+  raise("e_estop")
+  for _, robot in ipairs(ROBOTS) do wait_answer(robot .. "/" .. (place.answer or "safe_hold.ok"), 0.1) end
+  local heard = now() - at
+  wait(2)
+  s:stop()
+  local before = measured(s, at)
+  local after, step = measured(s, at + 0.3)
+  figure{ name = name .. ": fastest", value = before, unit = "m/s" }
+  expect{ name = name .. ": 0.3 s later", value = after, max = 0.02, unit = "m/s" }
+  worst = { heard = math.max(worst.heard, heard), speed = math.max(worst.speed, before), step = math.max(worst.step, step) }
+  both("e_reset")
+  wait(0.5)
+end
+expect{ name = "braking begins within", value = worst.heard, max = 0.001, unit = "s" }
+expect{ name = "it was in motion, at most", value = worst.speed, min = 0.1, unit = "m/s" }
+expect{ name = "torque in 1 ms", value = worst.step, max = 0.5, unit = "N m" }

@@ -1,0 +1,115 @@
+//! The scenarios of `examples/scenarios`, as `davit run` runs them in simulated time: each ends well, and within its bounds.
+
+use davit::app::script::{self, Interrupt, ScriptOptions};
+use davit::lang::LoadOptions;
+use davit::libraries;
+use davit::time::Clock;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+/// Each with what is set for it here: what takes a minute in the file is shorter.
+const SCENARIOS: [(&str, &[(&str, &str)]); 11] = [
+    ("bring_up", &[]),
+    ("crash", &[]),
+    ("driver", &[]),
+    ("estop", &[]),
+    ("hang", &[]),
+    ("link", &[]),
+    ("modes", &[]),
+    ("peer_restart", &[]),
+    ("push", &[]),
+    ("shutdown_while_copying", &[]),
+    ("tracking", &[("seconds", "20")]),
+];
+
+fn folder() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/scenarios")
+}
+
+fn run(name: &str) {
+    let (_, set) = SCENARIOS.iter().find(|(scenario, _)| *scenario == name).expect("listed");
+    let mut load = LoadOptions::default();
+    load.set.extend(set.iter().map(|(name, value)| ((*name).to_owned(), (*value).to_owned())));
+    let clock = Clock::simulated();
+    let end = script::run(
+        &folder().join(format!("{name}.lua")),
+        ScriptOptions {
+            clock: clock.clone(),
+            extensions: libraries::builtin().into(),
+            load,
+            platform: None,
+            observer: None,
+            interrupt: Interrupt::default(),
+            door: None,
+            say: Box::new(|_| {}),
+        },
+    );
+    clock.shutdown();
+    assert!(end.failure.is_none(), "{:?}\n{:#?}", end.failure, end.figures);
+    assert!(!end.figures.is_empty(), "it measures something");
+    let ended = end.ended.expect("it deployed something");
+    assert!(ended.is_clean() && ended.forced.is_empty(), "{ended:?}");
+}
+
+#[test]
+fn every_scenario_is_run() {
+    let files: BTreeSet<String> =
+        std::fs::read_dir(folder()).unwrap().map(|file| file.unwrap().file_name().into_string().unwrap()).collect();
+    let listed: BTreeSet<String> = SCENARIOS.iter().map(|(name, _)| format!("{name}.lua")).collect();
+    assert_eq!(files, listed);
+}
+
+#[test]
+fn bring_up() {
+    run("bring_up");
+}
+
+#[test]
+fn crash() {
+    run("crash");
+}
+
+#[test]
+fn driver() {
+    run("driver");
+}
+
+#[test]
+fn estop() {
+    run("estop");
+}
+
+#[test]
+fn hang() {
+    run("hang");
+}
+
+#[test]
+fn link() {
+    run("link");
+}
+
+#[test]
+fn modes() {
+    run("modes");
+}
+
+#[test]
+fn peer_restart() {
+    run("peer_restart");
+}
+
+#[test]
+fn push() {
+    run("push");
+}
+
+#[test]
+fn shutdown_while_copying() {
+    run("shutdown_while_copying");
+}
+
+#[test]
+fn tracking() {
+    run("tracking");
+}
