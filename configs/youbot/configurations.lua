@@ -138,7 +138,7 @@ ConfiguratorConf {
   profile_slow_link = Configuration { group = "profile",
     property_set("Cart_Impedance.stiffness", 150.0), property_set("Cart_Impedance.damping_abs", 18.0) },
 
-  relink = Configuration { description = "the link from the beginning, as a new epoch",
+  relink = Configuration { description = "the link from the beginning: its statistics, its clocks",
     pre_conf_state  = { "Link_Tx:stopped", "Link_Rx:stopped" },
     operation_call("Link_Rx.reset_stats"),
     post_conf_state = { "Link_Rx:running", "Link_Tx:running" },

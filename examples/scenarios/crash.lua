@@ -36,11 +36,8 @@ for _, dead in ipairs(DEAD) do
     wait_state("left:copying", 10)
   else
     -- A controller that is back within a tenth of a second is waited for.
-    -- Monitors that are dead go on saying that the arms are near: the other one stays in `copying`, without a force.
-    if component ~= "Monitors" then
-      wait_state("right:harmonizing", 1)
-      expect{ name = component .. ": the other lets go after", value = 1000 * (now() - at), max = 500, unit = "ms" }
-    end
+    wait_state("right:harmonizing", 1)
+    expect{ name = component .. ": the other lets go after", value = 1000 * (now() - at), max = 500, unit = "ms" }
     wait(at + 1 - now())
     s:stop()
     local x, y, z, rest = s:values("x"), s:values("y"), s:values("z"), 0

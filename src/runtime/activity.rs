@@ -10,7 +10,7 @@ use super::latest::Reader;
 use crate::limits;
 use crate::model::monitor::Counter;
 use crate::model::{Activity as Spec, ActivityStatus, ComponentName, Ident, RunState};
-use crate::time::{Clock, Next, Receiver, Signal, Time};
+use crate::time::{Clock, Receiver, Signal, TaskWait, Time};
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
@@ -166,10 +166,10 @@ impl ActivityThread {
     }
 
     /// Serves what is asked; while nothing runs, or when it is to end, answers what to wait for.
-    fn attend(&self, rounds: &mut Rounds) -> Option<Next> {
+    fn attend(&self, rounds: &mut Rounds) -> Option<TaskWait> {
         self.parked.store(false, Ordering::SeqCst);
         if self.ended.load(Ordering::SeqCst) {
-            return Some(Next::End);
+            return Some(TaskWait::End);
         }
         self.take_up(&mut rounds.held);
         while let Ok(request) = rounds.requests.try_recv() {
@@ -181,11 +181,11 @@ impl ActivityThread {
         rounds.idle = true;
         self.parked.store(true, Ordering::SeqCst);
         // Whoever starts a component sees the mark, or is seen here.
-        (self.running.load(Ordering::SeqCst) == 0).then_some(Next::Wait(Time::NEVER))
+        (self.running.load(Ordering::SeqCst) == 0).then_some(TaskWait::Wait(Time::NEVER))
     }
 
     /// What it does when it is its turn: what is asked, and a round when one is due.
-    pub(crate) fn step(&self, rounds: &mut Rounds) -> Next {
+    pub(crate) fn step(&self, rounds: &mut Rounds) -> TaskWait {
         if !rounds.begun {
             rounds.begun = true;
             rounds.release = self.clock.now();
@@ -199,7 +199,7 @@ impl ActivityThread {
         }
     }
 
-    fn step_periodic(&self, period: Duration, rounds: &mut Rounds) -> Next {
+    fn step_periodic(&self, period: Duration, rounds: &mut Rounds) -> TaskWait {
         let step = u64::try_from(period.as_nanos()).unwrap_or(u64::MAX);
         loop {
             if let Some(next) = self.attend(rounds) {
@@ -211,7 +211,7 @@ impl ActivityThread {
             }
             let release = rounds.release;
             if now < release {
-                return Next::Wait(release);
+                return TaskWait::Wait(release);
             }
             let late = now.since(release);
             self.counters.latency_last.store(nanos(late), Ordering::Relaxed);
@@ -232,7 +232,7 @@ impl ActivityThread {
         }
     }
 
-    fn step_on_events(&self, rounds: &mut Rounds) -> Next {
+    fn step_on_events(&self, rounds: &mut Rounds) -> TaskWait {
         loop {
             if let Some(next) = self.attend(rounds) {
                 return next;
@@ -257,13 +257,13 @@ impl ActivityThread {
             });
             if !any {
                 rounds.restless = 0;
-                return Next::Wait(next);
+                return TaskWait::Wait(next);
             }
             if rounds.restless >= limits::EVENT_ROUNDS {
                 // A loop of components that wake each other would hold simulated time still and a CPU busy for ever.
                 rounds.restless = 0;
                 self.counters.overruns.fetch_add(1, Ordering::Relaxed);
-                return Next::Pause(self.clock.now() + limits::EVENT_PAUSE);
+                return TaskWait::Pause(self.clock.now() + limits::EVENT_PAUSE);
             }
             rounds.restless += 1;
         }

@@ -198,7 +198,7 @@ impl Clock {
             drop(done);
         });
         match thread {
-            Ok(thread) => Ok(Join { ended, thread: Some(thread) }),
+            Ok(thread) => Ok(Join { ended, thread: Some(thread), last: TaskThread::default() }),
             Err(error) => {
                 if let (TimeKind::Simulated(scheduler), Some(id)) = (&*self.0, id) {
                     scheduler.withdraw(id);
@@ -255,7 +255,12 @@ pub struct Join {
     ended: Receiver<Result<(), JoinError>>,
     /// None: a task, which has no thread of its own.
     thread: Option<JoinHandle<()>>,
+    /// The thread that has run the end of a task.
+    last: TaskThread,
 }
+
+/// Where the thread is put that has run the last step of a task, and ends with it.
+pub(super) type TaskThread = Arc<Mutex<Option<JoinHandle<()>>>>;
 
 /// How a thread did not simply end.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -291,8 +296,8 @@ pub fn panic_text(payload: &(dyn Any + Send)) -> String {
 }
 
 impl Join {
-    pub(super) fn of_task(ended: Receiver<Result<(), JoinError>>) -> Self {
-        Self { ended, thread: None }
+    pub(super) fn of_task(ended: Receiver<Result<(), JoinError>>, last: TaskThread) -> Self {
+        Self { ended, thread: None, last }
     }
 
     /// Waits until the thread has ended, at most until `deadline`.
@@ -303,7 +308,7 @@ impl Join {
         match self.ended.recv_deadline(deadline) {
             Ok(outcome) => {
                 // What is left of it needs no token: it is only taken off the operating system's list.
-                if let Some(thread) = self.thread {
+                if let Some(thread) = self.thread.or_else(|| lock(&self.last).take()) {
                     let _ = thread.join();
                 }
                 outcome

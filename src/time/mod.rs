@@ -26,7 +26,7 @@ pub mod wall;
 pub use channel::{Receiver, RecvError, SendError, Sender, TryRecvError, TrySendError};
 pub use clock::{Clock, Guard, Join, JoinError, Released};
 pub use signal::Signal;
-pub use turns::Next;
+pub use turns::TaskWait;
 pub use wall::Wall;
 
 use std::sync::{Mutex, MutexGuard, PoisonError};

@@ -20,7 +20,7 @@ pub(super) struct Scheduler {
     pub(super) now: AtomicU64,
     pub(super) state: Mutex<SchedulerState>,
     /// Where threads that run tasks wait for one.
-    pub(super) runners: Condvar,
+    pub(super) idle_runners: Condvar,
 }
 
 struct Pace {
@@ -42,7 +42,7 @@ impl Scheduler {
             pace: factor.map(|factor| Pace { factor, start: Instant::now() }),
             now: AtomicU64::new(0),
             state: Mutex::new(SchedulerState::default()),
-            runners: Condvar::new(),
+            idle_runners: Condvar::new(),
         }
     }
 
@@ -93,6 +93,11 @@ impl Scheduler {
     pub(super) fn begin(&self, id: Id) {
         self.be(id);
         self.wait_for_turn(lock(&self.state), id, Called::Nobody);
+    }
+
+    /// Room for what [`Self::be`] notes, so that a task's step allocates nothing whoever runs it.
+    pub(super) fn make_room() {
+        MEMBER.with_borrow_mut(|list| list.reserve(4));
     }
 
     /// The calling thread speaks for participant `id`, until it is [nobody](Self::be_nobody).
@@ -253,7 +258,7 @@ impl Scheduler {
         match called {
             Called::Nobody => {}
             Called::Thread(turn) => turn.call(),
-            Called::Runner => self.runners.notify_one(),
+            Called::Runner => self.idle_runners.notify_one(),
         }
     }
 

@@ -5,14 +5,15 @@
 //! runs step after step as long as nobody else is due. A step that waits in the middle after all (a component that sleeps, or
 //! hangs) keeps its thread, and another one goes on with the rest. The order of steps is that of threads.
 
-use super::clock::{Clock, Join, JoinError, TimeKind};
+use super::clock::{Clock, Join, JoinError, TaskThread, TimeKind};
 use super::simulated::Scheduler;
-use super::turns::{Called, Id, Next, Task, WaitUntil};
+use super::turns::{Called, ClockTask, Id, TaskWait, WaitUntil};
 use super::{Sender, Signal, Time, lock};
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::PoisonError;
 use std::sync::atomic::Ordering;
+use std::thread::JoinHandle;
 
 /// A task, with what it is woken by and who is told of its end.
 struct SignalledTask<F> {
@@ -21,10 +22,12 @@ struct SignalledTask<F> {
     /// It has waited for the signal, which is cleared when that has ended.
     waited: bool,
     done: Sender<Result<(), JoinError>>,
+    /// For the thread that has run its last step, which is joined with it.
+    last: TaskThread,
 }
 
-impl<F: FnMut() -> Next + Send> Task for SignalledTask<F> {
-    fn step(&mut self) -> Next {
+impl<F: FnMut() -> TaskWait + Send> ClockTask for SignalledTask<F> {
+    fn step(&mut self) -> TaskWait {
         if std::mem::take(&mut self.waited) {
             self.signal.clear();
         }
@@ -36,8 +39,9 @@ impl<F: FnMut() -> Next + Send> Task for SignalledTask<F> {
         self.waited
     }
 
-    fn end(self: Box<Self>, panic: Option<Box<dyn Any + Send>>) {
-        let Self { step, done, .. } = *self;
+    fn end(self: Box<Self>, panic: Option<Box<dyn Any + Send>>, thread: Option<JoinHandle<()>>) {
+        let Self { step, done, last, .. } = *self;
+        *lock(&last) = thread;
         let dropped = catch_unwind(AssertUnwindSafe(|| drop(step))).err();
         let outcome = panic.or(dropped).map_or(Ok(()), |payload| Err(JoinError::of(&*payload)));
         let _ = done.try_send(outcome);
@@ -53,7 +57,7 @@ impl Clock {
         &self,
         name: &str,
         signal: &Signal,
-        step: impl FnMut() -> Next + Send + 'static,
+        step: impl FnMut() -> TaskWait + Send + 'static,
     ) -> std::io::Result<Join> {
         let signal = signal.clone();
         let scheduler = match &*self.0 {
@@ -63,30 +67,33 @@ impl Clock {
                 return self.try_spawn(name, move || {
                     loop {
                         match step() {
-                            Next::Wait(deadline) => drop(signal.wait(deadline)),
-                            Next::Pause(until) => clock.sleep_until(until),
-                            Next::End => return,
+                            TaskWait::Wait(deadline) => drop(signal.wait(deadline)),
+                            TaskWait::Pause(until) => clock.sleep_until(until),
+                            TaskWait::End => return,
                         }
                     }
                 });
             }
         };
-        let clock = self.clone();
+        let (clock, mut state) = (self.clone(), lock(&scheduler.state));
         // As many as there are tasks: one that waits in the middle of a step keeps the thread that runs it.
-        std::thread::Builder::new().name("davit-activities".to_owned()).spawn(move || {
+        let thread = std::thread::Builder::new().name(name.to_owned()).spawn(move || {
             if let TimeKind::Simulated(scheduler) = &*clock.0 {
                 scheduler.run_tasks();
             }
         })?;
-        let (done, ended) = self.channel(1);
-        scheduler.register_task(Box::new(SignalledTask { step, signal, waited: false, done }));
-        Ok(Join::of_task(ended))
+        // Before it can look for something to run.
+        state.runners.insert(thread.thread().id(), thread);
+        drop(state);
+        let ((done, ended), last) = (self.channel(1), TaskThread::default());
+        scheduler.register_task(Box::new(SignalledTask { step, signal, waited: false, done, last: last.clone() }));
+        Ok(Join::of_task(ended, last))
     }
 }
 
 impl Scheduler {
     /// A new participant, ready for its first step.
-    fn register_task(&self, task: Box<dyn Task>) {
+    fn register_task(&self, task: Box<dyn ClockTask>) {
         let mut state = lock(&self.state);
         let id = state.add();
         if let Some(participant) = state.participants.get_mut(&id) {
@@ -98,11 +105,12 @@ impl Scheduler {
 
     /// Runs whichever task is due, until one of them has ended: then there is a thread too many.
     fn run_tasks(&self) {
+        Self::make_room();
         let mut state = lock(&self.state);
         loop {
             let due = state.due.take();
             let Some((id, task)) = due.and_then(|id| Some((id, state.participants.get_mut(&id)?.task.take()?))) else {
-                state = self.runners.wait(state).unwrap_or_else(PoisonError::into_inner);
+                state = self.idle_runners.wait(state).unwrap_or_else(PoisonError::into_inner);
                 continue;
             };
             drop(state);
@@ -128,14 +136,14 @@ impl Scheduler {
     }
 
     /// The task, which waits now; none: it has ended.
-    fn run_until_it_waits(&self, id: Id, mut task: Box<dyn Task>) -> Option<Box<dyn Task>> {
+    fn run_until_it_waits(&self, id: Id, mut task: Box<dyn ClockTask>) -> Option<Box<dyn ClockTask>> {
         loop {
             let waits = match catch_unwind(AssertUnwindSafe(|| task.step())) {
-                Ok(Next::Wait(deadline)) => task.begin_wait(deadline, &mut || {
+                Ok(TaskWait::Wait(deadline)) => task.begin_wait(deadline, &mut || {
                     let mut state = lock(&self.state);
                     self.begin_wait(&mut state, id, deadline)
                 }),
-                Ok(Next::Pause(until)) => {
+                Ok(TaskWait::Pause(until)) => {
                     let mut state = lock(&self.state);
                     let later = until > Time(self.now.load(Ordering::Relaxed));
                     if later {
@@ -143,12 +151,9 @@ impl Scheduler {
                     }
                     later
                 }
-                Ok(Next::End) => {
-                    task.end(None);
-                    return None;
-                }
-                Err(panic) => {
-                    task.end(Some(panic));
+                ended => {
+                    let own = lock(&self.state).runners.remove(&std::thread::current().id());
+                    task.end(ended.err(), own);
                     return None;
                 }
             };

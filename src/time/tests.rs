@@ -295,7 +295,7 @@ fn trace_of_tasks(clock: &Clock, tasks: bool) -> Vec<String> {
     let trace = Arc::new(Mutex::new(Vec::new()));
     let guard = clock.enter();
     let mut joins = Vec::new();
-    let spawn = |name: &str, signal: &Signal, mut step: Box<dyn FnMut() -> Next + Send>| {
+    let spawn = |name: &str, signal: &Signal, mut step: Box<dyn FnMut() -> TaskWait + Send>| {
         if tasks {
             clock.try_spawn_task(name, signal, step).unwrap()
         } else {
@@ -303,9 +303,9 @@ fn trace_of_tasks(clock: &Clock, tasks: bool) -> Vec<String> {
             clock.clone().spawn(name, move || {
                 loop {
                     match step() {
-                        Next::Wait(deadline) => drop(signal.wait(deadline)),
-                        Next::Pause(until) => clock.sleep_until(until),
-                        Next::End => return,
+                        TaskWait::Wait(deadline) => drop(signal.wait(deadline)),
+                        TaskWait::Pause(until) => clock.sleep_until(until),
+                        TaskWait::End => return,
                     }
                 }
             })
@@ -317,7 +317,7 @@ fn trace_of_tasks(clock: &Clock, tasks: bool) -> Vec<String> {
         let (mut i, mut next) = (0, clock.now());
         let step = move || {
             if own.now() < next {
-                return Next::Wait(next);
+                return TaskWait::Wait(next);
             }
             i += 1;
             lock(&trace).push(format!("{} {name}{i}", own.now()));
@@ -326,14 +326,14 @@ fn trace_of_tasks(clock: &Clock, tasks: bool) -> Vec<String> {
             }
             own.sleep(MS * sleeps);
             next += MS * period;
-            if i == 40 { Next::End } else { Next::Pause(next) }
+            if i == 40 { TaskWait::End } else { TaskWait::Pause(next) }
         };
         joins.push(spawn(name, &signal, Box::new(step)));
     }
     let (own, to) = (clock.clone(), trace.clone());
     let step = move || {
         lock(&to).push(format!("{} woken", own.now()));
-        if own.now() >= at(90) { Next::End } else { Next::Wait(own.now() + MS * 25) }
+        if own.now() >= at(90) { TaskWait::End } else { TaskWait::Wait(own.now() + MS * 25) }
     };
     joins.push(spawn("woken", &woken, Box::new(step)));
     let (own, to) = (clock.clone(), trace.clone());
@@ -370,8 +370,8 @@ fn a_task_that_waits_in_the_middle_holds_up_nobody() {
     let steps = Arc::new(AtomicU64::new(0));
     let (own, count) = (clock.clone(), steps.clone());
     let step = move || match count.fetch_add(1, Ordering::SeqCst) {
-        9 => Next::End,
-        _ => Next::Pause(own.now() + MS),
+        9 => TaskWait::End,
+        _ => TaskWait::Pause(own.now() + MS),
     };
     let other = clock.try_spawn_task("other", &clock.signal(), step).unwrap();
     assert_eq!(other.join(Time::NEVER), Ok(()));
@@ -392,7 +392,7 @@ fn tasks_are_woken_from_outside() {
     let step = move || {
         n += 1;
         back.try_send(n).unwrap();
-        if n == 500 { Next::End } else { Next::Wait(Time::NEVER) }
+        if n == 500 { TaskWait::End } else { TaskWait::Wait(Time::NEVER) }
     };
     let task = clock.try_spawn_task("task", &signal, step).unwrap();
     for n in 1..=500 {

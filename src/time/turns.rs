@@ -9,6 +9,7 @@ use std::any::Any;
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, VecDeque};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::thread::{JoinHandle, ThreadId};
 use std::time::Duration;
 
 /// A participant. Numbers only grow, so they are also the order among those who wait for the same moment.
@@ -46,6 +47,8 @@ pub(super) struct SchedulerState {
     pub(super) hand_overs: u64,
     /// The task whose turn it is, until one of the threads that run tasks has taken it.
     pub(super) due: Option<Id>,
+    /// The threads that run tasks, one for each.
+    pub(super) runners: FxHashMap<ThreadId, JoinHandle<()>>,
 }
 
 #[derive(Default)]
@@ -55,23 +58,23 @@ pub(super) struct Participant {
     pub(super) wait: Option<u64>,
     /// A task between two of its steps: whoever runs tasks takes it from here. None: a thread waits for the turn, also that
     /// of a task whose step waits for something in the middle.
-    pub(super) task: Option<Box<dyn Task>>,
+    pub(super) task: Option<Box<dyn ClockTask>>,
 }
 
 /// What is done step by step, and waits between its steps.
-pub(super) trait Task: Send {
-    fn step(&mut self) -> Next;
+pub(super) trait ClockTask: Send {
+    fn step(&mut self) -> TaskWait;
 
     /// Registers the wait for its signal; false: there is nothing to wait for.
     fn begin_wait(&mut self, deadline: Time, begin: &mut dyn FnMut() -> WaitUntil) -> bool;
 
-    /// It has ended, by itself or in a panic.
-    fn end(self: Box<Self>, panic: Option<Box<dyn Any + Send>>);
+    /// It has ended, by itself or in a panic; the thread that has run it ends, too.
+    fn end(self: Box<Self>, panic: Option<Box<dyn Any + Send>>, thread: Option<JoinHandle<()>>);
 }
 
 /// When a task wants its next step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Next {
+pub enum TaskWait {
     /// When its signal is set, at the latest at this moment.
     Wait(Time),
     /// At this moment, whatever its signal says.

@@ -20,6 +20,11 @@ impl Transaction {
         self.touched.join(touched);
     }
 
+    /// Whether a safe configuration has interrupted it.
+    pub fn is_interrupted(&self) -> bool {
+        self.interrupted
+    }
+
     /// Tells of each step of a best effort that was done when that was.
     pub fn note_done(&self, touched: &mut Touched) {
         let forward = &self.forward;

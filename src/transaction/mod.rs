@@ -311,11 +311,6 @@ impl Transaction {
         }
     }
 
-    /// Whether a safe configuration has interrupted it.
-    pub fn is_interrupted(&self) -> bool {
-        self.interrupted
-    }
-
     /// Calls that are out are told that they are given up.
     fn cancel(&mut self) {
         let run = self.in_hand();

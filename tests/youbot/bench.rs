@@ -123,6 +123,10 @@ fn member(component: &str, name: &str) -> MemberRef {
 impl Bench {
     /// Nothing deployed; `name` is a file under deployments/.
     pub fn new(name: &str) -> Self {
+        Self::on(name, Clock::simulated())
+    }
+
+    fn on(name: &str, clock: Clock) -> Self {
         static NEXT: Mutex<i64> = Mutex::new(0);
         let id = {
             let mut next = NEXT.lock().unwrap();
@@ -134,7 +138,6 @@ impl Bench {
             .with(davit::libraries::youbot::library())
             .with(davit::libraries::monitors::library(&deployment.monitors))
             .with(Library::new("test").with::<Probe>("test.Probe"));
-        let clock = Clock::simulated();
         let guard = clock.enter();
         let platform = Arc::new(EmbeddedPlatform::new(&clock, &libraries, &deployment.activities));
         let events = Events::default();
@@ -311,7 +314,16 @@ impl Bench {
 
     /// Up and engaged: the hand has aligned the arms and lets go.
     pub fn engaged(name: &str) -> Self {
-        let mut bench = Self::new(name);
+        Self::engages(Self::new(name))
+    }
+
+    /// The same with a thread for each activity, as where time is paced: what a thread asks for is its own activity's. The pace is
+    /// one that nothing waits for.
+    pub fn engaged_in_threads(name: &str) -> Self {
+        Self::engages(Self::on(name, Clock::simulated_paced(1e9)))
+    }
+
+    fn engages(mut bench: Self) -> Self {
         bench.all(&["create_core", "create_link", "create_monitors", "connect_all", "load_properties"]);
         bench.set("Operator", "script", "free 0.5; align 4");
         bench.probe();

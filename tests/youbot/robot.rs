@@ -300,7 +300,7 @@ fn the_coupling_is_passive() {
 
 #[test]
 fn the_control_loop_allocates_nothing() {
-    let mut bench = Bench::engaged("youbot_arm");
+    let mut bench = Bench::engaged_in_threads("youbot_arm");
     bench.apply("eight_DOF");
     bench.set("Operator", "script", "sway 60 0.042 0.042 0 0.15");
     bench.run(0.5);

@@ -8,14 +8,16 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Each with what is set for it here: what takes a minute in the file is shorter.
-const SCENARIOS: [(&str, &[(&str, &str)]); 11] = [
+const SCENARIOS: [(&str, &[(&str, &str)]); 13] = [
     ("bring_up", &[]),
     ("crash", &[]),
     ("driver", &[]),
+    ("engaged_in_motion", &[]),
     ("estop", &[]),
     ("hang", &[]),
     ("link", &[]),
     ("modes", &[]),
+    ("one_stops", &[]),
     ("peer_restart", &[]),
     ("push", &[]),
     ("shutdown_while_copying", &[]),
@@ -75,6 +77,11 @@ fn driver() {
 }
 
 #[test]
+fn engaged_in_motion() {
+    run("engaged_in_motion");
+}
+
+#[test]
 fn estop() {
     run("estop");
 }
@@ -92,6 +99,11 @@ fn link() {
 #[test]
 fn modes() {
     run("modes");
+}
+
+#[test]
+fn one_stops() {
+    run("one_stops");
 }
 
 #[test]

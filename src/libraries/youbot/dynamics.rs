@@ -67,6 +67,9 @@ const SINGULARITY_DAMPING: f64 = 1e-4;
 
 /// Speed of recentring from which the arm's counter-motion is helped with all of the friction compensation, in m/s.
 const COUNTER_SPEED: f64 = 0.01;
+/// How the recentring sets out once the base yields, in m/s²: a base that went off at once for what is centimetres off would drive
+/// the arm's joints faster than a push does, with nobody touching anything.
+const SETTING_OUT: f64 = 0.4;
 /// Joint speed by which the counter-motion may be wrong before all of the friction compensation corrects it, in rad/s.
 const COUNTER_SLOPE: f64 = 0.03;
 
@@ -81,6 +84,8 @@ pub struct Dynamics {
     coupling: J5,
     /// How far the base yields because the other one does, 0 to 1.
     mutual: f64,
+    /// For how long the base has yielded, in s.
+    yielding: f64,
 }
 
 /// What the coupling wants of the law.
@@ -139,7 +144,7 @@ impl ToolSpace {
 impl Dynamics {
     /// A law for an arm.
     pub fn new(model: ArmModel) -> Self {
-        Self { model, parameters: DynamicsParameters::default(), coupling: J5::zeros(), mutual: 0.0 }
+        Self { model, parameters: DynamicsParameters::default(), coupling: J5::zeros(), mutual: 0.0, yielding: 0.0 }
     }
 
     /// One step of `dt` seconds. `coupled`: what the coupling wants; none: nothing, or it is not known any more, and only
@@ -161,6 +166,8 @@ impl Dynamics {
         let (mut twist, mut coupling) = (Twist2::default(), J5::zeros());
         let mutual = coupled.is_some_and(|coupled| coupled.peer_yields);
         self.mutual = (self.mutual + if mutual { dt / ENGAGE } else { -dt / FADE }).clamp(0.0, 1.0);
+        let yields = p.yields() && self.mutual > 0.0 && coupled.is_some_and(|coupled| coupled.engaged > 0.0);
+        self.yielding = if yields { self.yielding + dt } else { 0.0 };
         if let Some(Coupled { force, engaged, .. }) = coupled.filter(|coupled| coupled.engaged > 0.0) {
             let arm: Jacobian = jacobian.fixed_columns::<JOINTS>(3).into_owned();
             coupling = arm.tr_mul(force);
@@ -168,11 +175,12 @@ impl Dynamics {
             if let Some(tool) = &tool {
                 coupling += self.posture_torque(tool, q, qd) * *engaged;
             }
-            if p.yields() && self.mutual > 0.0 {
+            if yields {
                 let base = jacobian.fixed_columns::<3>(0);
                 let wrench = base.tr_mul(force) * self.mutual;
                 let off = Vector3::new(at.tool.x - p.r_nominal[0], at.tool.y - p.r_nominal[1], 0.0);
                 let home = off * (p.recenter_gain * engaged * self.mutual);
+                let home = home.cap_magnitude(SETTING_OUT * self.yielding);
                 twist = Twist2 {
                     vx: p.force_gain.x * wrench.x + home.x,
                     vy: p.force_gain.y * wrench.y + home.y,
@@ -294,6 +302,32 @@ mod tests {
         assert_eq!(moves(false), Twist2::default(), "the other base stands");
         assert!((moves(true).vx - 0.2).abs() < 2e-3, "{:?}", moves(true));
         assert_eq!(moves(false), Twist2::default());
+    }
+
+    #[test]
+    fn the_base_sets_out_gently_for_a_tool_that_is_off_its_place() {
+        let model = ArmModel::youbot(0.219, 1.0);
+        let mut law = Dynamics::new(model.clone());
+        law.parameters.force_gain = Vector3::new(0.1, 0.1, 0.1);
+        let q = radians([0.0, -50.0, -70.0, -60.0, 0.0]);
+        let off = at_tool(&model, &q) - Vector3::new(law.parameters.r_nominal[0], law.parameters.r_nominal[1], 0.0);
+        let off = off.xy().norm();
+        assert!(off > 0.03, "{off}");
+        let tool = Tool::of(&model, &q, &J5::zeros(), Default::default(), Default::default());
+        let rest = Coupled { force: Vector3::zeros(), engaged: 1.0, peer_yields: true };
+        let mut last = 0.0;
+        for tick in 1..=6000 {
+            let twist = law.update(&q, &J5::zeros(), &tool.jacobian, Some(&rest), 0.001).twist;
+            let speed = twist.vx.hypot(twist.vy);
+            let most = SETTING_OUT * f64::from(tick) * 0.001;
+            assert!(speed <= most + 1e-9 && speed >= last - 1e-9, "{speed} after {tick} ms");
+            last = speed;
+        }
+        assert!((last - law.parameters.recenter_gain * off).abs() < 1e-6, "in the end all of it: {last}");
+        // Once more from where it is.
+        law.update(&q, &J5::zeros(), &tool.jacobian, None, 1.0);
+        let again = law.update(&q, &J5::zeros(), &tool.jacobian, Some(&rest), 0.001).twist;
+        assert!(again.vx.hypot(again.vy) < 1e-3, "{again:?}");
     }
 
     fn at_tool(model: &ArmModel, q: &J5) -> Vector3<f64> {

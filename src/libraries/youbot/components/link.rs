@@ -1,8 +1,17 @@
 //! `youbot.Link_Tx` and `youbot.Link_Rx`: the two ends of the link to the other robot.
 
+use super::aged;
 use super::samples::{ExtRef, ToolPose, ToolTwist, stamp};
 use crate::libraries::youbot::link::{Echo, LinkReceiver, LinkStats, Packet, PeerState, RESTART_SHOWN};
 use crate::runtime::{Builder, Component, Context, In, OperationAnswer, Out, Prop};
+
+/// What was told longer ago is not so any more, in s: who told it (monitors every 10 ms) may be dead.
+const FLAG_STALE: f64 = 0.05;
+
+/// Whether it was told of late.
+fn is_so(flag: &mut In<bool>, cx: &Context) -> bool {
+    aged(flag, cx).is_some_and(|(is, age)| is && age <= FLAG_STALE)
+}
 
 /// Sends where the tool is.
 pub struct LinkTx {
@@ -36,7 +45,7 @@ impl Component for LinkTx {
         Self {
             tool_pose: b.doc("Where the tool is.").input("tool_pose"),
             tool_twist: b.doc("How it moves.").input("tool_twist"),
-            aligned: b.doc("Whether our wanted force is small.").input("aligned"),
+            aligned: b.doc("Whether our wanted force is small; no longer so when 50 ms old, like the next two.").input("aligned"),
             copying: b.doc("Whether we want to be coupled.").input("copying"),
             yields: b.doc("Whether our base yields.").input("yields"),
             energy: b.doc("Energy our coupling has given to the other one so far.").unit("J").input("energy"),
@@ -68,9 +77,9 @@ impl Component for LinkTx {
             echo: self.echo.get().unwrap_or_default(),
             p: pose.p,
             v: twist.v,
-            aligned: self.aligned.get().unwrap_or(false),
-            copying: self.copying.get().unwrap_or(false),
-            yields: self.yields.get().unwrap_or(false),
+            aligned: is_so(&mut self.aligned, cx),
+            copying: is_so(&mut self.copying, cx),
+            yields: is_so(&mut self.yields, cx),
             energy: self.energy.get().unwrap_or(0.0),
         });
     }
