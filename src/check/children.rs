@@ -23,7 +23,7 @@ pub struct Child {
 }
 
 /// Of so many subsystems of one file it is known how they stand.
-pub const MOST_CHILDREN: usize = 32;
+pub const MOST_CHILDREN: usize = 21;
 
 impl Child {
     /// The subsystems of a file, as its coordinators know them.
@@ -50,6 +50,11 @@ pub fn begun(at: usize) -> u64 {
 
 pub fn promised(at: usize) -> u64 {
     1 << (at + MOST_CHILDREN)
+}
+
+/// The parent has let it go, and it was not down since.
+pub fn released(at: usize) -> u64 {
+    1 << (at + 2 * MOST_CHILDREN)
 }
 
 /// A subsystem with the numbers of its coordinators.

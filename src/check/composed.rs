@@ -147,10 +147,11 @@ fn put_together(whole: Arc<Deployment>, reports: Vec<(Option<Ident>, Report)>) -
     let mut explored = Explored { complete: true, without_failure: true, ..Explored::default() };
     let mut left: BTreeSet<String> = BTreeSet::new();
     let mut told: Vec<(Finding, Option<String>)> = Vec::new();
-    let (mut followed, mut replayed) = (true, true);
+    let (mut followed, mut replayed, mut refused) = (true, true, false);
     for (path, report) in reports {
         followed &= report.verdict != CheckVerdict::Refused || report.replayed.is_some();
         replayed &= report.replayed.is_some();
+        refused |= report.verdict == CheckVerdict::Refused;
         explored = explored.and(report.explored);
         left.extend(report.left.into_iter().map(|bound| match path {
             Some(path) => format!("`{path}`: {bound}"),
@@ -158,10 +159,11 @@ fn put_together(whole: Arc<Deployment>, reports: Vec<(Option<Ident>, Report)>) -
         }));
         let file = |path: &Option<Ident>| path.and_then(|path| Some(whole.subsystem(path.as_str())?.file.clone()));
         let own = file(&path);
-        // What is wrong in one file is told once, however often that is a subsystem.
+        // What is wrong in one file is told once, however often that is a subsystem; what is worse with other parameters is told again.
         let said = |finding: &Finding| {
             let same = |(known, of): &(Finding, Option<String>)| {
-                own.is_some() && *of == own && (known.code, &known.message) == (finding.code, &finding.message)
+                let words = (known.code, &known.message) == (finding.code, &finding.message);
+                own.is_some() && *of == own && words && known.severity >= finding.severity
             };
             told.iter().any(same)
         };
@@ -173,7 +175,10 @@ fn put_together(whole: Arc<Deployment>, reports: Vec<(Option<Ident>, Report)>) -
     all.sort_by_key(|(finding, _)| std::cmp::Reverse(finding.severity));
     let (findings, traces): (Vec<Finding>, Vec<_>) = all.into_iter().unzip();
     let left: Vec<String> = left.into_iter().collect();
-    let verdict = CheckVerdict::of(&findings, followed, left.clone());
+    let verdict = match refused {
+        true => CheckVerdict::Refused,
+        false => CheckVerdict::of(&findings, followed, left.clone()),
+    };
     let checked = (verdict != CheckVerdict::Refused).then(|| Accepted::new(whole.clone()));
     let replayed = replayed.then(|| Accepted::new(whole));
     Report { checked, replayed, findings, traces, explored, left, verdict }

@@ -2,10 +2,12 @@
 //! and who is therefore followed together.
 
 use super::coordinator::ask_of;
+use super::interface::told_by;
 use super::members::hears_loss;
 use crate::model::codes::{COORD_SHARED, DEPLOY_EVENT_UNHEARD};
 use crate::model::{
-    Ask, ComponentName, ConfigId, Configuration, Deployment, Finding, Findings, Ident, RequestId, Severity, Target,
+    Ask, ComponentName, ConfigId, Configuration, Deployment, EventName, Finding, Findings, Ident, RequestId, Severity,
+    Subsystem, Target,
 };
 use crate::stack::claims::{self, Claim, Claims};
 use crate::stack::{Request, Requester};
@@ -184,13 +186,40 @@ impl<'a> Meeting<'a> {
             ids.iter().any(|id| self.deployment.configuration(*id).is_some_and(is))
         };
         let withholds = |a, b| of(a, |c| c.safe) && of(b, |c| c.confirm.is_some());
-        same || withholds(own, other)
+        same || self.lead(a, b)
+            || self.lead(b, a)
+            || withholds(own, other)
             || withholds(other, own)
             || hears(a, b)
             || hears(b, a)
             || reports(own, b)
             || reports(other, a)
             || claim.meets(theirs)
+    }
+
+    /// Whether one says something that what the other does with subsystems, or with what a parent may touch, depends on.
+    fn lead(&self, a: usize, b: usize) -> bool {
+        let raises =
+            |number: usize, event: EventName| self.charts[number].raises().iter().any(|site| site.name == event);
+        let touches = |number: usize, is: &dyn Fn(ComponentName) -> bool| {
+            let mut configurations = self.asked[number].0.iter().filter_map(|id| self.deployment.configuration(*id));
+            configurations.any(|c| claims::components(c).into_iter().any(is))
+        };
+        let commands = |number: usize, subsystem: &Subsystem| {
+            let own = &*subsystem.own;
+            let until = own.interface.leaving.map(|leaving| leaving.until);
+            let mut all = [own.deploy.event, own.shutdown.event].into_iter().chain(until);
+            all.any(|event| raises(number, event.within(subsystem.name)))
+        };
+        let meets = |subsystem: &Subsystem| {
+            let hears = || told_by(subsystem).into_iter().any(|event| self.charts[b].event(event) != EventId::OTHER);
+            let touches = || touches(b, &|component| component.local(subsystem.name).is_some());
+            commands(a, subsystem) && (commands(b, subsystem) || hears() || touches())
+        };
+        let interface = &self.deployment.interface;
+        let exported = |component| interface.exports.values().any(|export| export.of.component == component);
+        self.deployment.subsystems.iter().any(meets)
+            || interface.from.is_some_and(|(from, _)| raises(a, from) && touches(b, &exported))
     }
 
     /// Whether what a coordinator does and this, done by an operator, have to do with each other.

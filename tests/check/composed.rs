@@ -88,6 +88,61 @@ const PAIR_COORDINATOR: &str = "return state {
   trans { src = 'ltwo', tgt = 'idle', events = { 'left/down' } },
 }";
 
+/// An arm passed on.
+const MID: &str = "davit: 1
+name: mid
+platform: simulated
+types: {}
+subsystems: { inner: { deployment: arm.yaml } }
+exports: { ports: { pose: inner.pose, ref: inner.ref }, properties: { k: inner.k } }
+accepts: [e_released]
+emits: [e_leaving]
+leaving: { says: e_leaving, until: e_released }
+configurations: [mid_conf.lua]
+coordinator: mid.lua
+deploy: { event: e_start, up: on, within_s: 8 }
+shutdown: { event: e_shutdown, down: idle, within_s: 8 }
+";
+const MID_COORDINATOR: &str = "return state {
+  idle = state {}, raising = state { entry = 'inner/e_start' }, on = state {}, leaving = state { entry = 'e_leaving' },
+  lowering = state { entry = { 'inner/e_shutdown', 'inner/e_released' } },
+  trans { src = 'initial', tgt = 'idle' },
+  trans { src = 'idle', tgt = 'raising', events = { 'e_start' } },
+  trans { src = 'raising', tgt = 'on', events = { 'inner/up' } },
+  trans { src = 'raising', tgt = 'lowering', events = { 'e_shutdown' } },
+  trans { src = 'on', tgt = 'leaving', events = { 'e_shutdown', 'inner/e_leaving' } },
+  trans { src = 'leaving', tgt = 'lowering', events = { 'e_released' } },
+  trans { src = 'lowering', tgt = 'idle', events = { 'inner/down' } },
+}";
+/// Two coordinators for a pair: one begins and ends, the other touches.
+const LEAD: &str = "return state {
+  idle = state {}, raising = state { entry = { 'left/e_start', 'right/e_start' } }, on = state {},
+  lowering = state { entry = { 'left/e_shutdown', 'right/e_shutdown', 'left/e_released', 'right/e_released' } },
+  trans { src = 'initial', tgt = 'idle' },
+  trans { src = 'idle', tgt = 'raising', events = { 'e_start' } },
+  trans { src = 'raising', tgt = 'on', events = { 'left/up' } },
+  trans { src = 'raising', tgt = 'lowering', events = { 'e_shutdown' } },
+  trans { src = 'on', tgt = 'lowering', events = { 'e_shutdown' } },
+  trans { src = 'lowering', tgt = 'idle', events = { 'left/down' } },
+}";
+const LINK: &str = "return state {
+  idle = state {}, waiting = state {}, joining = state { entry = 'stiff' }, joined = state {}, parting = state { entry = 'stiff.undo' },
+  trans { src = 'initial', tgt = 'idle' },
+  trans { src = 'idle', tgt = 'waiting', events = { 'e_start' } },
+  trans { src = 'waiting', tgt = 'joining', events = { 'left/up' } },
+  trans { src = 'waiting', tgt = 'idle', events = { 'e_shutdown' } },
+  trans { src = 'joining', tgt = 'joined', events = { 'stiff.ok' } },
+  trans { src = 'joining', tgt = 'parting', events = { 'stiff.failed', 'stiff.broken' } },
+  trans { src = 'joined', tgt = 'parting', events = { 'e_shutdown' } },
+  trans { src = 'parting', tgt = 'idle', events = { 'stiff.undone', 'stiff.undo.failed', 'stiff.undo.broken' } },
+}";
+const VOICE: &str = "return state {
+  quiet = state {}, loud = state { entry = 'e_built' },
+  trans { src = 'initial', tgt = 'quiet' },
+  trans { src = 'quiet', tgt = 'loud', events = { 'e_start' } },
+  trans { src = 'loud', tgt = 'quiet', events = { 'e_shutdown' } },
+}";
+
 /// The files of the pair, some of them changed: `(file, what stands there, what is to stand there)`.
 fn files(changes: &[(&str, &str, &str)]) -> Sources {
     let mut files = [
@@ -97,6 +152,12 @@ fn files(changes: &[(&str, &str, &str)]) -> Sources {
         ("pair.yaml", PAIR.to_owned()),
         ("pair_conf.lua", PAIR_CONF.to_owned()),
         ("pair.lua", PAIR_COORDINATOR.to_owned()),
+        ("mid.yaml", MID.to_owned()),
+        ("mid_conf.lua", "ConfiguratorConf {}".to_owned()),
+        ("mid.lua", MID_COORDINATOR.to_owned()),
+        ("lead.lua", LEAD.to_owned()),
+        ("link.lua", LINK.to_owned()),
+        ("voice.lua", VOICE.to_owned()),
     ];
     for (file, before, after) in changes {
         let text = &mut files.iter_mut().find(|(name, _)| name == file).expect("a file of the pair").1;
@@ -118,7 +179,7 @@ fn catalogue(deployment: &Deployment) -> Catalogue {
 }
 
 /// What reading finds, or, where it finds nothing, what `check` finds.
-fn found(changes: &[(&str, &str, &str)]) -> Vec<Finding> {
+pub fn found(changes: &[(&str, &str, &str)]) -> Vec<Finding> {
     let loaded = load(&files(changes), "pair.yaml", &[]);
     match loaded.deployment {
         Some(deployment) if loaded.findings.is_empty() => {
@@ -130,7 +191,7 @@ fn found(changes: &[(&str, &str, &str)]) -> Vec<Finding> {
 }
 
 /// The one finding of that code: what it says, and what it says to do.
-fn one(changes: &[(&str, &str, &str)], code: &str) -> (String, String) {
+pub fn one(changes: &[(&str, &str, &str)], code: &str) -> (String, String) {
     let found = found(changes);
     let of: Vec<&Finding> =
         found.iter().filter(|finding| finding.code.0 == code && finding.severity > Severity::Info).collect();

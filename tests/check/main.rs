@@ -18,6 +18,7 @@ mod demands;
 mod flat_plans;
 mod follow;
 mod product;
+mod promised;
 mod replayed;
 mod shown;
 mod stopping;

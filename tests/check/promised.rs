@@ -1,0 +1,153 @@
+//! What a subsystem exports, and who is held to it: made anew, passed on, let go, by one coordinator or by several.
+
+use super::composed::{found, one};
+use davit::model::{Finding, Severity};
+
+type Change = (&'static str, &'static str, &'static str);
+
+/// In the pair `left` is an arm that is passed on.
+const PASSED_ON: Change =
+    ("pair.yaml", "left: { deployment: arm.yaml, parameters: { gain: 0.7 } }", "left: { deployment: mid.yaml }");
+
+fn of(changes: &[Change], code: &str, severity: Severity) -> Vec<String> {
+    let is = |finding: &Finding| finding.code.0 == code && finding.severity == severity;
+    found(changes).into_iter().filter(is).map(|finding| finding.message).collect()
+}
+
+#[test]
+fn what_is_wrong_with_the_parameters_of_one_instance_only_is_told() {
+    let again = [
+        ("arm.yaml", "accepts: [e_released]", "accepts: [e_released, e_again]"),
+        (
+            "arm.lua",
+            "on = state {},",
+            "on = state {}, again = state { entry = gain < 0.6 and 'make.undo' or 'e_built' },",
+        ),
+        (
+            "arm.lua",
+            "  trans { src = 'on', tgt = 'leaving'",
+            "  trans { src = 'on', tgt = 'again', events = { 'e_again' } },
+  trans { src = 'again', tgt = 'on', events = { gain < 0.6 and 'make.undo.failed' or 'e_done' } },
+  trans { src = 'again', tgt = 'leaving', events = { 'e_shutdown' } },
+  trans { src = 'on', tgt = 'leaving'",
+        ),
+    ];
+    let both = of(&again, "coord::request_refused", Severity::Error);
+    assert!(both.iter().any(|says| says.contains("`make.undo`")), "{both:?} {:#?}", found(&again));
+    let known = of(&again, "coord::request_refused", Severity::Info);
+    assert!(
+        known.iter().any(|says| both.contains(says)),
+        "the words are those of a note of `left`: {known:?} {both:?}"
+    );
+}
+
+#[test]
+fn an_in_port_that_is_passed_on_is_driven_by_the_parent_alone() {
+    assert!(of(&[PASSED_ON], "compose::export_driven", Severity::Error).is_empty());
+    let driven = (
+        "mid_conf.lua",
+        "ConfiguratorConf {}",
+        "ConfiguratorConf { push = Configuration { port_write('inner.ref', 1.0) } }",
+    );
+    let says = one(&[PASSED_ON, driven], "compose::export_driven").0;
+    assert!(says.contains("is exported as `ref`"), "{says}");
+}
+
+#[test]
+fn what_is_exported_is_not_made_anew_while_it_is_promised() {
+    for remake in ["destroy('D'), create('D', 'Drive'), post_conf_state = { 'D:running' }", "replace('D', 'Other')"] {
+        let remade = format!(
+            "run = Configuration {{ post_conf_state = {{ 'D:running' }} }}, remake = Configuration {{ {remake} }},"
+        );
+        let remade = [
+            ("arm.yaml", "  Drive:\n", "  Other: { properties: { k: { type: float, default: 1.0 } } }\n  Drive:\n"),
+            ("arm.yaml", "accepts: [e_released]", "accepts: [e_released, e_again]"),
+            ("arm_conf.lua", "run = Configuration { post_conf_state = { 'D:running' } },", remade.as_str()),
+            ("arm.lua", "on = state {},", "on = state {}, again = state { entry = 'remake' },"),
+            (
+                "arm.lua",
+                "  trans { src = 'on', tgt = 'leaving'",
+                "  trans { src = 'on', tgt = 'again', events = { 'e_again' } },
+  trans { src = 'again', tgt = 'on', events = { 'remake.ok', 'remake.failed' } },
+  trans { src = 'again', tgt = 'leaving', events = { 'e_shutdown' } },
+  trans { src = 'on', tgt = 'leaving'",
+            ),
+        ];
+        let found = found(&remade);
+        let told =
+            found.iter().find(|finding| finding.code.0 == "compose::unleft" && finding.message.starts_with("`remake`"));
+        let told = told.unwrap_or_else(|| panic!("{remake}: {found:#?}"));
+        assert!(told.is_error() && told.message.contains("between `e_built` and `e_released`"), "{told:?}");
+    }
+}
+
+#[test]
+fn what_is_passed_on_is_promised_as_long_as_the_subsystem_promises_it() {
+    let unleft = |changes: &[Change]| of(changes, "compose::unleft", Severity::Error);
+    assert!(unleft(&[PASSED_ON]).is_empty(), "{:#?}", found(&[PASSED_ON]));
+    assert!(found(&[PASSED_ON]).iter().all(|finding| !finding.is_error()), "{:#?}", found(&[PASSED_ON]));
+    let early = ("mid.lua", "events = { 'inner/up' }", "events = { 'inner/e_start.ignored' }");
+    let late = ("mid.lua", "tgt = 'leaving', events = { 'e_shutdown'", "tgt = 'lowering', events = { 'e_shutdown'");
+    for wrong in [early, late] {
+        let says = unleft(&[PASSED_ON, wrong]);
+        let [says] = &says[..] else { panic!("{wrong:?}: {says:?}") };
+        assert!(
+            says.starts_with("what is exported of `inner` need not be there between `up` and `e_released`"),
+            "{says}"
+        );
+    }
+}
+
+#[test]
+fn what_a_subsystem_told_before_it_was_let_go_promises_nothing_anew() {
+    let stale = [
+        ("pair.lua", "lone = state {},", "lone = state {}, again = state { entry = 'stiff' },"),
+        (
+            "pair.lua",
+            "  trans { src = 'lowering', tgt = 'lone'",
+            "  trans { src = 'lowering', tgt = 'again', events = { 'left/up' } },
+  trans { src = 'again', tgt = 'parting', events = { 'stiff.ok' } },
+  trans { src = 'lowering', tgt = 'lone'",
+        ),
+    ];
+    let says = of(&stale, "compose::promise", Severity::Error);
+    assert!(
+        says.iter().any(|says| says == "`stiff` is asked for where what `left` exports need not be there"),
+        "{says:?}"
+    );
+}
+
+#[test]
+fn who_begins_a_subsystem_and_who_touches_it_are_followed_together() {
+    let two = [
+        ("pair.yaml", "coordinator: pair.lua", "coordinators: { lead: lead.lua, link: link.lua }"),
+        ("pair.yaml", "up: coupled", "up: ['lead:on', 'link:joined']"),
+    ];
+    let says = of(&two, "compose::promise", Severity::Error);
+    assert!(says.iter().any(|says| says.starts_with("`stiff` is in force where `left`")), "{says:?}");
+}
+
+#[test]
+fn who_promises_an_export_and_who_makes_it_are_followed_together() {
+    let two = [
+        ("arm.yaml", "coordinator: arm.lua", "coordinators: { body: arm.lua, voice: voice.lua }"),
+        ("arm.yaml", "up: on", "up: ['body:on', 'voice:loud']"),
+        ("arm.yaml", "down: idle", "down: ['body:idle', 'voice:quiet']"),
+        ("arm.lua", "entry = { 'e_built', 'run' }", "entry = 'run'"),
+    ];
+    let says = of(&two, "compose::unleft", Severity::Error);
+    assert!(
+        says.iter().any(|says| says.starts_with("`D`, which is exported, is not there")),
+        "{says:?} {:#?}",
+        found(&two)
+    );
+}
+
+#[test]
+fn a_subsystem_that_waits_to_be_let_go_is_let_go_by_somebody() {
+    let never = [("pair.lua", "'left/e_released', 'right/e_released'", "'right/e_released'")];
+    let says = of(&never, "compose::unleft", Severity::Warning);
+    let expected = "`left/e_shutdown` is raised and `left/e_released` never: `left` waits for that before it goes down";
+    assert_eq!(says, [expected]);
+    assert!(of(&[], "compose::unleft", Severity::Warning).is_empty());
+}
