@@ -172,6 +172,10 @@ fn put_together(whole: Arc<Deployment>, reports: Vec<(Option<Ident>, Report)>) -
         told.extend(found.iter().map(|(finding, _)| (finding.clone(), own.clone())));
         all.extend(found.into_iter().map(|(finding, way)| (within(finding, path), alone(way, path))));
     }
+    if whole.own_part().configurations.iter().any(|configuration| configuration.safe) {
+        left.insert("what a safe configuration interrupts in subsystems is not followed there".to_owned());
+        explored.complete = false;
+    }
     all.sort_by_key(|(finding, _)| std::cmp::Reverse(finding.severity));
     let (findings, traces): (Vec<Finding>, Vec<_>) = all.into_iter().unzip();
     let left: Vec<String> = left.into_iter().collect();

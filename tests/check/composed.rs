@@ -144,7 +144,7 @@ const VOICE: &str = "return state {
 }";
 
 /// The files of the pair, some of them changed: `(file, what stands there, what is to stand there)`.
-fn files(changes: &[(&str, &str, &str)]) -> Sources {
+pub fn files(changes: &[(&str, &str, &str)]) -> Sources {
     let mut files = [
         ("arm.yaml", ARM.to_owned()),
         ("arm_conf.lua", ARM_CONF.to_owned()),
@@ -167,12 +167,12 @@ fn files(changes: &[(&str, &str, &str)]) -> Sources {
     Sources::memory(files)
 }
 
-fn load(sources: &Sources, file: &str, set: &[(&str, &str)]) -> lang::Loaded {
+pub fn load(sources: &Sources, file: &str, set: &[(&str, &str)]) -> lang::Loaded {
     let set = set.iter().map(|(name, value)| ((*name).to_owned(), (*value).to_owned())).collect();
     lang::load_from(sources, Path::new(file), &LoadOptions { set, ..LoadOptions::default() })
 }
 
-fn catalogue(deployment: &Deployment) -> Catalogue {
+pub fn catalogue(deployment: &Deployment) -> Catalogue {
     let mut catalogue = monitors::added_to(Libraries::default(), &deployment.monitors).catalogue();
     deployment.types.iter().for_each(|ty| _ = catalogue.insert(ty.clone()));
     catalogue

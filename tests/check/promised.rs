@@ -1,6 +1,7 @@
 //! What a subsystem exports, and who is held to it: made anew, passed on, let go, by one coordinator or by several.
 
-use super::composed::{found, one};
+use super::composed::{catalogue, files, found, load, one};
+use davit::check::{self, CheckVerdict};
 use davit::model::{Finding, Severity};
 
 type Change = (&'static str, &'static str, &'static str);
@@ -124,7 +125,7 @@ fn who_begins_a_subsystem_and_who_touches_it_are_followed_together() {
         ("pair.yaml", "up: coupled", "up: ['lead:on', 'link:joined']"),
     ];
     let says = of(&two, "compose::promise", Severity::Error);
-    assert!(says.iter().any(|says| says.starts_with("`stiff` is in force where `left`")), "{says:?}");
+    assert!(says.iter().any(|says| says.starts_with("`stiff` is ") && says.contains("`left`")), "{says:?}");
 }
 
 #[test]
@@ -150,4 +151,17 @@ fn a_subsystem_that_waits_to_be_let_go_is_let_go_by_somebody() {
     let expected = "`left/e_shutdown` is raised and `left/e_released` never: `left` waits for that before it goes down";
     assert_eq!(says, [expected]);
     assert!(of(&[], "compose::unleft", Severity::Warning).is_empty());
+}
+
+#[test]
+fn what_a_safe_configuration_interrupts_in_a_subsystem_is_not_said_to_be_followed() {
+    let bounds = |changes: &[Change]| {
+        let deployment = load(&files(changes), "pair.yaml", &[]).deployment.unwrap();
+        let types = catalogue(&deployment);
+        let report = check::run(deployment, &types);
+        assert!(report.verdict != CheckVerdict::Sound || report.left.is_empty());
+        report.left.iter().filter(|bound| bound.contains("safe configuration")).count()
+    };
+    assert_eq!(bounds(&[]), 0);
+    assert_eq!(bounds(&[("pair_conf.lua", "stiff = Configuration {", "stiff = Configuration { safe = true, ")]), 1);
 }
