@@ -5,7 +5,9 @@
 //! are the components that they export, which are there while that is promised ([`promises`](super::promises) holds both to it).
 
 use super::report::{Accepted, Explored, Report};
+use super::simulated;
 use super::trace::{Does, TraceStep};
+use super::universe::Universe;
 use super::verdict::CheckVerdict;
 use crate::model::subsystem::ExportKind;
 use crate::model::{
@@ -34,8 +36,15 @@ pub fn run(
         let local = catalogue.known_in(subsystem.name);
         reports.push((Some(subsystem.name), run(subsystem.own.clone(), &local, one)));
     }
-    let (view, types) = parents_view(whole.own_part(), catalogue);
-    reports.push((None, one(Arc::new(view), &types)));
+    let (mut view, types) = parents_view(whole.own_part(), catalogue);
+    // Steps of subsystems may be meant, also of what these do not export.
+    view.faults.clear();
+    let mut report = one(Arc::new(view), &types);
+    for finding in simulated::faults(whole.own_part(), &whole, &Universe::new(&whole, catalogue)) {
+        report.findings.push(finding);
+        report.traces.push(Vec::new());
+    }
+    reports.push((None, report));
     put_together(whole, reports)
 }
 

@@ -34,8 +34,24 @@ pub fn check(deployment: &Deployment, universe: &Universe) -> Findings {
         }
         findings.extend(wrong.into_iter().map(|finding| finding.path(format!("simulated.reactions[{i}]"))));
     }
+    findings.extend(faults(deployment, deployment, universe));
+    if !deployment.kind.imitates && !deployment.reactions.is_empty() {
+        let message = format!("the platform is `{}`: what `simulated` says is not used", deployment.platform);
+        findings.push(
+            Finding::warning(SIMULATED_NOT_USED, message)
+                .at(deployment.key_origin("simulated"))
+                .path("simulated")
+                .help("write `platform: simulated`, or leave it out"),
+        );
+    }
+    findings
+}
+
+/// What is wrong with the faults that a file has, of steps of the `whole` that runs, its subsystems' among them.
+pub fn faults(deployment: &Deployment, whole: &Deployment, universe: &Universe) -> Findings {
+    let mut findings = Vec::new();
     for (i, fault) in deployment.faults.iter().enumerate() {
-        let wrong = self::fault(fault, deployment, universe);
+        let wrong = self::fault(fault, whole, universe);
         findings.extend(wrong.into_iter().map(|finding| finding.path(format!("faults[{i}]"))));
     }
     if !deployment.kind.imitates && !deployment.faults.is_empty() {
@@ -46,15 +62,6 @@ pub fn check(deployment: &Deployment, universe: &Universe) -> Findings {
                 .at(deployment.key_origin("faults"))
                 .path("faults")
                 .help("`davit run --platform simulated` runs it there"),
-        );
-    }
-    if !deployment.kind.imitates && !deployment.reactions.is_empty() {
-        let message = format!("the platform is `{}`: what `simulated` says is not used", deployment.platform);
-        findings.push(
-            Finding::warning(SIMULATED_NOT_USED, message)
-                .at(deployment.key_origin("simulated"))
-                .path("simulated")
-                .help("write `platform: simulated`, or leave it out"),
         );
     }
     findings

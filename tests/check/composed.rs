@@ -455,3 +455,22 @@ fn what_is_accepted_file_by_file_is_refused_by_no_product() {
     }
     assert!(accepted > 5 && refused > 5, "{accepted} accepted, {refused} refused");
 }
+
+#[test]
+fn a_fault_may_be_of_a_step_of_a_subsystem_that_exports_nothing_of_it() {
+    let brakes = (
+        "arm_conf.lua",
+        "  run = Configuration {",
+        "  halt = Configuration { operation_call('D.brake') },\n  run = Configuration {",
+    );
+    let with = |step: &str| {
+        let faults = format!("platform: simulated\nfaults: [{{ step: '{step}', how: fail }}]\ntypes: {{}}");
+        let errors = found(&[brakes, ("pair.yaml", "platform: simulated\ntypes: {}", &faults)]);
+        errors.into_iter().filter(Finding::is_error).map(|error| error.message).collect::<Vec<_>>()
+    };
+    for step in ["operation_call left/D.brake", "start right/D", "connect left/D.pose -> right/D.ref"] {
+        assert!(with(step).is_empty(), "{step}: {:?}", with(step));
+    }
+    assert_eq!(with("operation_call left/D.brak").len(), 1);
+    assert_eq!(with("start middle/D").len(), 1);
+}
