@@ -98,8 +98,9 @@ impl Graph<'_, '_> {
                 let of = match request.ask {
                     Ask::Apply(id) | Ask::UndoOf(id) => remakes(&id),
                     ask if ask.is_undo() => world.and_then(|world| {
-                        let frames = world.stack.frames().iter().filter(|frame| frame.requester == request.requester);
-                        frames.last().and_then(|frame| remakes(&frame.configuration))
+                        let mut frames = world.stack.frames().iter();
+                        let newest = frames.rfind(|frame| frame.requester == request.requester);
+                        newest.and_then(|frame| remakes(&frame.configuration))
                     }),
                     _ => None,
                 };

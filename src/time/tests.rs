@@ -347,8 +347,7 @@ fn trace_of_tasks(clock: &Clock, tasks: bool) -> Vec<String> {
         join.join(Time::NEVER).unwrap();
     }
     drop(guard);
-    let trace = std::mem::take(&mut *lock(&trace));
-    trace
+    std::mem::take(&mut *lock(&trace))
 }
 
 #[test]
