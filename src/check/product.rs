@@ -23,7 +23,7 @@ use super::state::{Failed, Move, Next, Nexts, ProductState, Reacts, Unconfirmed,
 use super::world::Worlds;
 use crate::limits;
 use crate::model::{Catalogue, ConfigId, Deployment, EventName, Precedence, Verdict};
-use crate::stack::{Desk, FrameId, Request, Requester, Why};
+use crate::stack::{ActiveBatch, Desk, FrameId, Request, Requester, Why};
 use crate::statechart::{Chart, EventId, NodeId};
 use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
@@ -241,7 +241,8 @@ impl<'a> Product<'a> {
         self.answers_come(state, &mut nexts);
         self.behind_given_up(state, &mut nexts);
         // What was interrupted goes back when the safe configuration is there, and what came later ends later.
-        let going = state.desk.under_way().iter().filter(|_| state.safe.is_empty());
+        let still = |active: &&ActiveBatch| !state.safe.is_empty() && state.interrupted(active.number).is_some();
+        let going = state.desk.under_way().iter().filter(|active| !still(active));
         let going =
             going.filter(|active| active.batch.requests.first().is_none_or(|first| !state.is_owed(first.requester)));
         let numbers: SmallVec<[u32; 4]> = going.map(|active| active.number).collect();

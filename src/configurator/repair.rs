@@ -11,7 +11,7 @@ use crate::limits;
 use crate::model::{ComponentName, RequestId, RunState, Snapshot, Step, Verdict};
 use crate::plan::undo::in_order;
 use crate::stack::{Edits, FrameId, Group, HandOver, Inverse, Residual, Why, keeps_still};
-use crate::system::{self, View as _, step};
+use crate::system::{self, View as _, step, touch};
 use crate::transaction::{BrokenPart, PartEnd, Spec, Transaction};
 use std::sync::Arc;
 
@@ -93,14 +93,15 @@ impl Engine {
         self.desk.active(number).and_then(|active| active.batch.requests.first())
     }
 
-    /// Whether something may move for who has it repaired: asked only when it is known what, since a safe configuration may come
-    /// while it is looked.
-    fn may_move(&self, by: By) -> bool {
+    /// Whether these may move for who has them repaired: asked only when it is known what is to be done, since a safe configuration
+    /// may come while it is looked.
+    fn may_move(&self, by: By, components: &[ComponentName]) -> bool {
+        let components = components.iter().copied();
         match by {
-            By::Recovery => self.world.stack.safe().next().is_none(),
+            By::Recovery => !components.into_iter().any(|component| self.world.stack.keeps_still(component)),
             By::Request(_) => self
                 .request_of(by)
-                .is_some_and(|request| request.why == Why::Asked && !keeps_still(&self.world, request)),
+                .is_some_and(|request| request.why == Why::Asked && !keeps_still(&self.world, request, components)),
             By::Nobody => false,
         }
     }
@@ -126,7 +127,9 @@ impl Engine {
             let steps: Vec<Step> =
                 steps.into_iter().filter(|step| matches!(step, Step::Disconnect { .. }) || !hung(step)).collect();
             let moves = system::diff::moves_any(&steps, &self.world.system);
-            let asked = self.may_move(by);
+            let touched: Vec<ComponentName> =
+                components.iter().copied().chain(steps.iter().flat_map(touch::components)).collect();
+            let asked = self.may_move(by, &touched);
             if moves && !asked && self.world.stack.safe().next().is_some() {
                 withheld = steps.iter().find(|step| step::moves(step, &self.world.system)).cloned();
             }

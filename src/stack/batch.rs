@@ -356,16 +356,12 @@ fn foreign(frames: &[Arc<super::Frame>], request: &Request) -> Option<ConfigId> 
     if request.force { None } else { frames.iter().find(others).map(|frame| frame.configuration) }
 }
 
-/// Whether nothing may move for a request, since a safe configuration of its (sub)system is in force: only what a coordinator asks for in a
-/// later step may, or what is forced.
-pub fn keeps_still(world: &World, request: &Request) -> bool {
+/// Whether these may not move for a request, since a safe configuration of their (sub)system is in force: only for what a
+/// coordinator asks in a later step they may, or for what is forced.
+pub fn keeps_still(world: &World, request: &Request, components: impl IntoIterator<Item = ComponentName>) -> bool {
     let foreign = request.requester == Requester::Operator || request.why != Why::Asked;
-    let still = || match request.ask {
-        Ask::Apply(id) | Ask::UndoOf(id) => world.stack.keeps_still(id),
-        // Whose frames these are is not known from the text.
-        Ask::Undo | Ask::UndoTo(_) | Ask::Commit { .. } => world.stack.safe().next().is_some(),
-    };
-    request.still || foreign && !request.force && still()
+    let held = || components.into_iter().any(|component| world.stack.keeps_still(component));
+    request.still || foreign && !request.force && held()
 }
 
 /// The part of a plan that must not be carried out now, and why: it needs a component in quarantine, or something would
@@ -390,13 +386,12 @@ fn forbidden(
         matches!(request.why, Why::Unconfirmed(..)) && !may
     };
     for (part, place) in group.places.iter().enumerate() {
-        let unasked = unasked(part, &requests[*place]);
-        if !unasked && !keeps_still(world, &requests[*place]) {
-            continue;
-        }
+        let request = &requests[*place];
+        let unasked = unasked(part, request);
+        let kept = |step: &Step| keeps_still(world, request, crate::system::touch::components(step));
         let steps = planned.steps.iter().enumerate();
         let mut own = steps.filter(|(at, _)| planned.part_of(planned.place(*at)) == part);
-        if let Some((_, moving)) = own.find(|(_, planned)| planned.moves) {
+        if let Some((_, moving)) = own.find(|(_, planned)| planned.moves && (unasked || kept(&planned.step))) {
             let step = moving.step.clone();
             return Some((part, if unasked { Reason::MovesUnasked(step) } else { Reason::Moves(step) }));
         }

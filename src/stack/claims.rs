@@ -137,7 +137,7 @@ impl Claims {
         };
         path.is_empty() || requests.clone().into_iter().any(belongs) || {
             let mut inside = Claim::default();
-            let names = self.numbers.iter().filter(|(name, _)| is_within(name.prefix(), path));
+            let names = self.numbers.iter().filter(|(name, _)| is_in_system(safe, **name));
             names.for_each(|(_, at)| inside.set(*at));
             inside.meets(&self.of(requests))
         }
@@ -164,6 +164,11 @@ impl Claims {
 /// Whether a configuration belongs to the (sub)system of another one, or to one inside it.
 pub fn is_of_system(of: ConfigId, id: ConfigId) -> bool {
     is_within(id.prefix(), of.prefix())
+}
+
+/// Whether a component is in the (sub)system of a configuration, or in one inside it.
+pub fn is_in_system(of: ConfigId, component: ComponentName) -> bool {
+    is_within(component.prefix(), of.prefix())
 }
 
 fn is_within(path: &str, outer: &str) -> bool {

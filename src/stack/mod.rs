@@ -48,7 +48,7 @@ use crate::plan::footprint::Footprint;
 use crate::plan::undo::DraftStep;
 use crate::plan::{PlannedStep, SavedValue};
 use crate::time::Time;
-use claims::is_of_system;
+use claims::is_in_system;
 use smallvec::SmallVec;
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -242,9 +242,9 @@ impl Stack {
         self.frames.iter().filter(|frame| frame.safe).map(|frame| frame.configuration)
     }
 
-    /// Whether one of them is of the (sub)system that a configuration belongs to, or of one around that.
-    pub fn keeps_still(&self, id: ConfigId) -> bool {
-        self.safe().any(|safe| is_of_system(safe, id))
+    /// Whether one of them keeps a component still: it is in its (sub)system, or in one inside that.
+    pub fn keeps_still(&self, component: ComponentName) -> bool {
+        self.safe().any(|safe| is_in_system(safe, component))
     }
 
     /// The state that a frame belongs to has been left, and the frame stays: from now on it is one like others.

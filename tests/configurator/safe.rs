@@ -2,7 +2,7 @@
 
 use crate::rig::*;
 use davit::configurator::Requester;
-use davit::model::{Ask, Configuration, RequestId, RunState, Value, Verdict};
+use davit::model::{Ask, ComponentType, Configuration, RequestId, RunState, TypeName, Value, Verdict};
 use davit::platform::simulated::{Delays, Fault, FaultRule, Faults, SimulatedOptions, StepPattern};
 use davit::stack::{Batch, Request, Scope};
 use std::sync::Arc;
@@ -486,18 +486,29 @@ fn a_safe_configuration_does_not_wait_for_a_look() {
 
 /// Two subsystems of one component each, and their parent's connection across.
 fn two_subsystems() -> Rig {
-    let mut all = vec![configuration("join", "", "connect left/A.y right/A.u; set right/A.k 9", "")];
+    let mut all = vec![
+        configuration("join", "", "connect left/A.y right/A.u; set right/A.k 9", ""),
+        configuration("lift", "", "call left/A.open", ""),
+    ];
     for path in ["left", "right"] {
         all.extend([
             configuration(&format!("{path}/make"), "", &format!("create {path}/A"), &format!("{path}/A:running")),
             configuration(&format!("{path}/gain"), "", &format!("set {path}/A.k 1"), ""),
+            configuration(&format!("{path}/lift"), "", &format!("call {path}/A.open"), ""),
             configuration(&format!("{path}/quiet"), &format!("{path}/A:stopped"), "", ""),
         ]);
     }
     for configuration in &mut all {
         configuration.safe = configuration.id.as_str().ends_with("quiet");
     }
-    let rig = Rig::new(all);
+    let mut types = catalogue();
+    let mut node = ComponentType::clone(types.get(TypeName::new("Node").unwrap()).expect("the one type"));
+    for operation in ["open", "close"] {
+        node.operations.get_mut(&ident(operation)).expect("one of its operations").moves = true;
+    }
+    types.insert(node);
+    let options = SimulatedOptions::default();
+    let rig = Rig::of(types, Default::default(), all, options, |platform| Arc::new(platform), Default::default());
     for path in ["left", "right"] {
         assert_eq!(rig.ask_as(&format!("{path}/make"), coordinator(path)), [format!("{path}/make.ok")]);
     }
@@ -542,4 +553,20 @@ fn while_that_of_a_subsystem_is_applied_others_begin() {
     assert_eq!(rig.events()[3..], ["left/quiet.ok", "left/gain.ok"]);
     rig.in_step();
     rig.each_answered_once();
+}
+
+#[test]
+fn what_a_subsystem_keeps_still_is_not_moved_from_outside_either() {
+    let rig = two_subsystems();
+    assert_eq!(rig.ask_as("left/quiet", coordinator("left")), ["left/quiet.ok"]);
+    for (number, (word, answer)) in
+        (900..).zip([("lift", "lift.failed"), ("left/lift", "left/lift.failed"), ("right/lift", "right/lift.ok")])
+    {
+        // An operator, without force.
+        let request = Request::new(RequestId(number), Ask::Apply(id(word)), Requester::Operator);
+        rig.handle.submit(Batch::one(request)).unwrap();
+        rig.wait(1.0);
+        assert_eq!(rig.events().last().unwrap(), answer);
+    }
+    rig.in_step();
 }
