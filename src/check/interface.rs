@@ -1,7 +1,8 @@
 //! What a deployment shows to one that it is a subsystem of, and what it says to its own subsystems, by the texts alone.
 
+use super::let_go;
 use super::universe::Universe;
-use crate::model::codes::{COMPOSE_EXPORT_DRIVEN, COMPOSE_SAFETY, COMPOSE_UNKNOWN, COMPOSE_UNLEFT, COMPOSE_WORD};
+use crate::model::codes::{COMPOSE_EXPORT_DRIVEN, COMPOSE_SAFETY, COMPOSE_UNKNOWN, COMPOSE_WORD};
 use crate::model::finding::did_you_mean;
 use crate::model::subsystem::{ExportKind, IGNORED};
 use crate::model::{
@@ -119,7 +120,7 @@ pub fn between(own: &Deployment, charts: &[&Chart], catalogue: &Catalogue) -> Fi
     let mut findings = Vec::new();
     for subsystem in &own.subsystems {
         unheard(subsystem, charts, &mut findings);
-        findings.extend(never_let_go(subsystem, charts));
+        findings.extend(let_go::check(own, subsystem, charts));
         let declared: Vec<(EventName, Origin)> = own.safety.clone();
         for (event, origin) in declared {
             let mut missing = Vec::new();
@@ -133,22 +134,6 @@ pub fn between(own: &Deployment, charts: &[&Chart], catalogue: &Catalogue) -> Fi
         }
     }
     findings
-}
-
-/// A subsystem that waits to be let go is ended, and nobody lets it go.
-fn never_let_go(subsystem: &Subsystem, charts: &[&Chart]) -> Option<Finding> {
-    let own = &*subsystem.own;
-    let until = own.interface.leaving?.until.within(subsystem.name);
-    let ends = own.shutdown.event.within(subsystem.name);
-    let raised = |event| charts.iter().flat_map(|chart| chart.raises()).find(|site| site.name == event);
-    let site = raised(ends).filter(|_| raised(until).is_none())?;
-    let message =
-        format!("`{ends}` is raised and `{until}` never: `{}` waits for that before it goes down", subsystem.name);
-    Some(
-        Finding::warning(COMPOSE_UNLEFT, message)
-            .at(site.origin)
-            .help(format!("raise `{until}` when nothing of what it exports is held any more")),
-    )
 }
 
 /// The subsystems with actuators that do not declare a safety event, to any depth.

@@ -37,6 +37,7 @@ mod judge;
 mod kept;
 mod lasts;
 mod late;
+mod let_go;
 mod lets_go;
 mod library;
 mod links;

@@ -210,7 +210,8 @@ codes! {
         "A subsystem with `leaving` destroys nothing that it exports before it has heard the event under `until`, so that nothing of its \
          parent is cut off; nor does it replace any or make it anew, and it passes on nothing of a subsystem of its own that does not promise it. \
          Wait for that event before the configurations that take exported components away. One without `leaving` may take them away whenever \
-         it is not *up*. A parent that ends a subsystem with `leaving` raises `until`, without which that never goes down.";
+         it is not *up*. A parent that ends a subsystem with `leaving` raises `until`, without which that never goes down, and raises it when \
+         the subsystem waits for it: what comes before is lost.";
     COMPOSE_EXPORT_DRIVEN = "compose::export_driven", "an exported in-port is driven inside",
         "An in-port that is exported is one that the parent drives: inside nothing is connected to it, and no configuration writes it. Export \
          an out-port, or remove the inner connection.";

@@ -165,3 +165,18 @@ fn what_a_safe_configuration_interrupts_in_a_subsystem_is_not_said_to_be_followe
     assert_eq!(bounds(&[]), 0);
     assert_eq!(bounds(&[("pair_conf.lua", "stiff = Configuration {", "stiff = Configuration { safe = true, ")]), 1);
 }
+
+#[test]
+fn to_let_go_with_the_end_is_too_early_where_the_subsystem_waits_later() {
+    let stops_first = ("arm.lua", "trans { src = 'on', tgt = 'leaving'", "trans { src = 'on', tgt = 'halting'");
+    let halts = (
+        "arm.lua",
+        "unmaking = state { entry = 'make.undo' },",
+        "unmaking = state { entry = 'make.undo' }, halting = state { entry = 'run.undo' }, 
+  trans { src = 'halting', tgt = 'leaving', events = { 'run.undone', 'run.undo.failed', 'run.undo.broken' } },",
+    );
+    let early = |changes: &[Change]| of(changes, "compose::unleft", Severity::Warning);
+    assert!(early(&[]).is_empty(), "it waits at once: {:?}", early(&[]));
+    let says = early(&[stops_first, halts]);
+    assert!(says.len() == 2 && says[0].contains("does not wait for it at once after `e_shutdown`"), "{says:?}");
+}
