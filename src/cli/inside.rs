@@ -7,6 +7,7 @@
 use super::CommandFailure;
 use crate::model::codes::CLI_UNKNOWN_SUBSYSTEM;
 use crate::model::finding::did_you_mean;
+use crate::model::names;
 use crate::model::{Ask, ComponentName, OPERATOR};
 use serde_json::Value as Json;
 
@@ -100,9 +101,9 @@ impl Region {
         if let Some((coordinator, state)) = name.split_once(':') {
             return format!("{}:{state}", self.name(coordinator));
         }
-        match name.strip_prefix(self.path.as_str()) {
-            Some("") => self.last().to_owned(),
-            Some(rest) if rest.starts_with('/') => rest[1..].to_owned(),
+        match names::local_to(name, &self.path) {
+            _ if name == self.path => self.last().to_owned(),
+            Some(own) => own.to_owned(),
             _ if is_nobodys(name) => name.to_owned(),
             _ => format!("/{name}"),
         }
@@ -129,7 +130,8 @@ impl Region {
 
 /// Whether a name, or a path, is that of a subsystem or in it.
 pub fn is_within(name: &str, path: &str) -> bool {
-    name.strip_prefix(path).is_some_and(|rest| rest.is_empty() || rest.starts_with(['/', ':']))
+    // Of a state the coordinator's name.
+    names::is_within(name.split(':').next().unwrap_or(name), path)
 }
 
 /// What has no place in any file: who asks from outside, and a request that names nothing.

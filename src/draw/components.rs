@@ -5,6 +5,7 @@ use super::diagram::{Diagram, DiagramEdge, DiagramNode, RankDirection, Subject};
 use super::hierarchy::SubsystemBoxes;
 use super::text::short;
 use crate::model::monitor::{ConditionKind, SignalKind, is_monitors};
+use crate::model::names::local_to;
 use crate::model::{
     Catalogue, ComponentName, Direction as PortDirection, MemberRef, Monitor, Policy, RunState, Snapshot, TypeName,
     Value,
@@ -73,7 +74,7 @@ pub fn components(
                 let folded = folded.entry(path).or_insert_with(|| FoldedBox::new(&mut diagram, &mut groups, path));
                 folded.states.push(component.state);
                 let called = view.called(name.as_str());
-                let before = called.strip_prefix(path).and_then(|rest| rest.strip_prefix('/')).unwrap_or(&called);
+                let before = local_to(&called, path).unwrap_or(&called);
                 ports(&mut diagram.nodes[folded.at], &mut rows, &format!("{before}."));
                 boxes.insert(*name, folded.at);
                 continue;

@@ -3,7 +3,7 @@
 use super::diagram::{Diagram, Tone};
 use super::hierarchy::SubsystemBoxes;
 use crate::model::finding::count;
-use crate::model::names::folded_into;
+use crate::model::names::{folded_into, local_to};
 use crate::model::{ComponentName, Ident, MemberRef, RunState};
 use std::collections::BTreeSet;
 
@@ -49,7 +49,7 @@ impl ComponentsView {
     /// How something is called that is drawn.
     pub(super) fn called(&self, name: &str) -> String {
         match self.inside {
-            Some(path) => match name.strip_prefix(path.as_str()).and_then(|rest| rest.strip_prefix('/')) {
+            Some(path) => match local_to(name, path.as_str()) {
                 Some(own) => own.to_owned(),
                 None => format!("/{name}"),
             },

@@ -3,7 +3,7 @@
 use super::coordinator::{UNVERIFIED, draw, fold};
 use super::diagram::{Diagram, DiagramEdge, DiagramNode, RankDirection, Shape, Subject};
 use crate::model::finding::count;
-use crate::model::names::folded_into;
+use crate::model::names::{folded_into, is_within, local_to};
 use crate::model::{EventName, Statechart};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -104,22 +104,19 @@ pub fn coordinators(title: &str, all: &[PlacedCoordinator<'_>], depth: usize) ->
 
 /// Whether a path is that of a subsystem, or of one in it. The top is none.
 fn within(path: &str, of: &str) -> bool {
-    !of.is_empty() && path.strip_prefix(of).is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
+    !of.is_empty() && is_within(path, of)
 }
 
 /// What the subsystem of a path is called in the file of that other one, if it is named there.
 fn child<'p>(path: &'p str, parent: &str) -> Option<&'p str> {
-    let name = match parent {
-        "" => path,
-        _ => path.strip_prefix(parent)?.strip_prefix('/')?,
-    };
+    let name = local_to(path, parent)?;
     (!name.contains('/')).then_some(name)
 }
 
 /// What a coordinator and a subsystem of its file tell each other.
 fn arrows(diagram: &mut Diagram, from: usize, to: usize, chart: &Statechart, subsystem: &str) {
     let of = |events: Vec<EventName>| {
-        let own = |event: &EventName| event.as_str().strip_prefix(subsystem)?.strip_prefix('/');
+        let own = |event: &EventName| local_to(event.as_str(), subsystem);
         let names: BTreeSet<&str> = events.iter().filter_map(own).collect();
         fold(&names.into_iter().map(str::to_owned).collect::<Vec<_>>())
     };

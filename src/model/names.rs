@@ -146,13 +146,24 @@ macro_rules! scoped {
 
             /// As it is called in the file of the subsystem of that path; none where it stands in another one.
             pub fn local(&self, path: Ident) -> Option<&'static str> {
-                self.as_str().strip_prefix(path.as_str())?.strip_prefix('/')
+                local_to(self.as_str(), path.as_str())
             }
         }
     )*};
 }
 
 scoped!(Ident, ComponentName, TypeName, ConfigId, EventName);
+
+/// What a name, or a path, is called in the file of the subsystem of that path; none where it stands in another one. In the
+/// deployment's own file, whose path is empty, everything is called as from outside.
+pub fn local_to<'n>(name: &'n str, path: &str) -> Option<&'n str> {
+    if path.is_empty() { Some(name) } else { name.strip_prefix(path)?.strip_prefix('/') }
+}
+
+/// Whether a path is that of a subsystem, or of one in it; all are in the deployment itself.
+pub fn is_within(path: &str, outer: &str) -> bool {
+    path == outer || local_to(path, outer).is_some()
+}
 
 /// How many levels below the top the subsystem of that path is: 0 the deployment itself, whose path is empty.
 pub fn level(path: &str) -> usize {
@@ -305,6 +316,15 @@ mod tests {
         assert!(EventName::new("e_done@root.a").is_ok());
         assert!(EventName::new("e b").is_err());
         assert_eq!(ComponentName::new("left/D").unwrap().prefix(), "left");
+    }
+
+    #[test]
+    fn a_path_is_within_itself_and_what_is_around_it() {
+        assert_eq!([local_to("left/D", "left"), local_to("lefty/D", "left")], [Some("D"), None]);
+        assert_eq!([local_to("left", "left"), local_to("left/D", "")], [None, Some("left/D")]);
+        let within = |path, outer| is_within(path, outer);
+        assert!(within("left", "left") && within("left/arm", "left") && within("left", "") && within("", ""));
+        assert!(!within("lefty", "left") && !within("", "left") && !within("left", "left/arm"));
     }
 
     #[test]

@@ -2,6 +2,7 @@
 //! same time (semantics: *Requests*).
 
 use super::request::Request;
+use crate::model::names::is_within;
 use crate::model::{Ask, ChangeKind, ComponentName, ConfigId, Configuration, Ident, Target};
 use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
@@ -169,10 +170,6 @@ pub fn is_of_system(of: ConfigId, id: ConfigId) -> bool {
 /// Whether a component is in the (sub)system of a configuration, or in one inside it.
 pub fn is_in_system(of: ConfigId, component: ComponentName) -> bool {
     is_within(component.prefix(), of.prefix())
-}
-
-fn is_within(path: &str, outer: &str) -> bool {
-    outer.is_empty() || path.strip_prefix(outer).is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
 }
 
 /// Calls `f` with the components that a configuration names; one may come more than once.
