@@ -4,7 +4,8 @@
 -- The four configurations of the coupling's switch are in coupling.lua.
 
 -- `stand_in`: a stand-in for the other robot is part of the deployment (deployments/youbot_arm.yaml). In the coupling of two robots there
--- is none (deployments/youbot_robot.yaml): what the link sends and hears is exported. `hand`: what the operator's hand does.
+-- is none (deployments/youbot_robot.yaml): what the link sends and hears is exported. `hand`: what the operator's hand does,
+-- `ifname`: the network interface of the drives' bus, which a driver has for itself.
 
 local function with_stand_in(changes, more)
   if stand_in then
@@ -19,7 +20,7 @@ ConfiguratorConf {
 
   create_core = Configuration { description = "the control loop",
     create("World",          "youbot.World",          { activity = "world" }),      -- arm, base and what they touch
-    create("youbot",         "youbot.Driver",         { activity = "control" }),
+    create("youbot",         "youbot.Driver",         { activity = "control", properties = { ifname = stand_in and "sim0" or ifname } }),
     create("Arm_Kinematics", "youbot.Arm_Kinematics", { activity = "control" }),
     create("Cart_Impedance", "youbot.Cart_Impedance", { activity = "control" }),
     create("Dynamics",       "youbot.Dynamics",       { activity = "control" }),

@@ -4,6 +4,7 @@ use super::state::ProductState;
 use crate::model::{ConfigId, Configuration, Deployment, EventName, Ident, Subsystem, SubsystemStanding};
 use crate::stack::claims;
 use rustc_hash::FxHashSet;
+use std::collections::BTreeSet;
 
 /// How a parent knows a subsystem.
 #[derive(Debug, Clone)]
@@ -20,6 +21,8 @@ pub struct Child {
     pub down: EventName,
     /// Configurations that touch what it exports.
     pub touching: FxHashSet<ConfigId>,
+    /// What it may hold for itself.
+    pub holds: BTreeSet<String>,
 }
 
 /// Of so many subsystems of one file it is known how they stand.
@@ -38,7 +41,8 @@ impl Child {
             };
             let touching = deployment.configurations.iter().filter(touches).map(|c| c.id).collect();
             let (begins, down) = (own.deploy.event.within(path), SubsystemStanding::Down.event(path));
-            Self { path, begins, from, up: SubsystemStanding::Up.event(path), until, down, touching }
+            let holds = subsystem.holds.clone();
+            Self { path, begins, from, up: SubsystemStanding::Up.event(path), until, down, touching, holds }
         };
         deployment.subsystems.iter().take(MOST_CHILDREN).map(of).collect()
     }

@@ -9,6 +9,7 @@ use super::simulated;
 use super::trace::{Does, TraceStep};
 use super::universe::Universe;
 use super::verdict::CheckVerdict;
+use crate::stack::contenders::may_hold;
 use crate::model::subsystem::ExportKind;
 use crate::model::{
     Catalogue, Change, ChangeKind, ComponentName, ComponentType, ConfigId, Configuration, Deployment, EventName,
@@ -39,6 +40,11 @@ pub fn run(
     let (mut view, types) = parents_view(whole.own_part(), catalogue);
     // Steps of subsystems may be meant, also of what these do not export.
     view.faults.clear();
+    let held = may_hold(whole.configurations.iter(), catalogue);
+    for subsystem in &mut view.subsystems {
+        let inside = held.iter().filter(|(component, _)| component.local(subsystem.name).is_some());
+        subsystem.holds = inside.flat_map(|(_, names)| names.iter().cloned()).collect();
+    }
     let mut report = one(Arc::new(view), &types);
     for finding in simulated::faults(whole.own_part(), &whole, &Universe::new(&whole, catalogue)) {
         report.findings.push(finding);

@@ -6,13 +6,14 @@ use super::interface::told_by;
 use super::members::hears_loss;
 use crate::model::codes::{COORD_SHARED, DEPLOY_EVENT_UNHEARD};
 use crate::model::{
-    Ask, ComponentName, ConfigId, Configuration, Deployment, EventName, Finding, Findings, Ident, RequestId, Severity,
+    Ask, Catalogue, ComponentName, ConfigId, Configuration, Deployment, EventName, Finding, Findings, Ident, RequestId, Severity,
     Subsystem, Target,
 };
 use crate::stack::claims::{self, Claim, Claims};
+use crate::stack::contenders::may_hold;
 use crate::stack::{Request, Requester};
 use crate::statechart::{Chart, EventId};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// The deployment as its `number`-th coordinator alone sees it. `charts` are all of them, compiled.
 pub fn view(deployment: &Deployment, charts: &[&Chart], number: usize) -> Option<Deployment> {
@@ -144,6 +145,8 @@ pub fn forgive_unheard(deployment: &Deployment, charts: &[&Chart], findings: &mu
 /// What coordinators and an operator may meet in, known from the text of what they ask for.
 struct Meeting<'a> {
     deployment: &'a Deployment,
+    /// What components that the configurations name may hold for themselves.
+    held: BTreeMap<ComponentName, BTreeSet<String>>,
     charts: &'a [&'a Chart],
     claims: Claims,
     /// What each coordinator may ask for, and what that claims.
@@ -151,15 +154,16 @@ struct Meeting<'a> {
 }
 
 impl<'a> Meeting<'a> {
-    fn of(deployment: &'a Deployment, charts: &'a [&'a Chart]) -> Self {
-        let claims = Claims::new(deployment.configurations.iter());
+    fn of(deployment: &'a Deployment, catalogue: &'a Catalogue, charts: &'a [&'a Chart]) -> Self {
+        let claims = Claims::new(deployment.configurations.iter(), catalogue);
         let asked = |chart: &&Chart| {
             let ids = asked(deployment, chart);
             let claim = claimed(&claims, &ids);
             (ids, claim)
         };
         let asked = charts.iter().map(asked).collect();
-        Self { deployment, charts, claims, asked }
+        let held = may_hold(deployment.configurations.iter(), catalogue);
+        Self { deployment, held, charts, claims, asked }
     }
 
     /// Whether two coordinators have to do with each other.
@@ -201,7 +205,7 @@ impl<'a> Meeting<'a> {
     fn lead(&self, a: usize, b: usize) -> bool {
         let raises =
             |number: usize, event: EventName| self.charts[number].raises().iter().any(|site| site.name == event);
-        let touches = |number: usize, is: &dyn Fn(ComponentName) -> bool| {
+        let touched = |number: usize, is: &dyn Fn(ComponentName) -> bool| {
             let mut configurations = self.asked[number].0.iter().filter_map(|id| self.deployment.configuration(*id));
             configurations.any(|c| claims::components(c).into_iter().any(is))
         };
@@ -213,13 +217,20 @@ impl<'a> Meeting<'a> {
         };
         let meets = |subsystem: &Subsystem| {
             let hears = || told_by(subsystem).into_iter().any(|event| self.charts[b].event(event) != EventId::OTHER);
-            let touches = || touches(b, &|component| component.local(subsystem.name).is_some());
-            commands(a, subsystem) && (commands(b, subsystem) || hears() || touches())
+            let touches = || touched(b, &|component| component.local(subsystem.name).is_some());
+            // Two that may hold the same thing are not both to be begun.
+            let contends = || {
+                let mut others = self.deployment.subsystems.iter().filter(|other| other.name != subsystem.name);
+                others.any(|other| !other.holds.is_disjoint(&subsystem.holds) && commands(b, other))
+            };
+            let held = |component| self.held.get(&component).is_some_and(|held| !held.is_disjoint(&subsystem.holds));
+            commands(a, subsystem)
+                && (commands(b, subsystem) || hears() || touches() || contends() || touched(b, &held))
         };
         let interface = &self.deployment.interface;
         let exported = |component| interface.exports.values().any(|export| export.of.component == component);
         self.deployment.subsystems.iter().any(meets)
-            || interface.from.is_some_and(|(from, _)| raises(a, from) && touches(b, &exported))
+            || interface.from.is_some_and(|(from, _)| raises(a, from) && touched(b, &exported))
     }
 
     /// Whether what a coordinator does and this, done by an operator, have to do with each other.
@@ -239,11 +250,11 @@ fn claimed(claims: &Claims, ids: &BTreeSet<ConfigId>) -> Claim {
 /// other, and nothing that an operator may apply touches what both touch. That a safe configuration of one group interrupts what is under
 /// way of another one is followed as something that may come at any time ([`safe_elsewhere`]). What holds of each group holds of all
 /// together, but for when all of them are *down* at once (`Graph::goes_on_when_down`).
-pub fn groups(deployment: &Deployment, charts: &[&Chart]) -> Vec<Vec<usize>> {
+pub fn groups(deployment: &Deployment, catalogue: &Catalogue, charts: &[&Chart]) -> Vec<Vec<usize>> {
     if charts.len() < 2 {
         return (0..charts.len()).map(|number| vec![number]).collect();
     }
-    let meeting = Meeting::of(deployment, charts);
+    let meeting = Meeting::of(deployment, catalogue, charts);
     let met = |id| (0..charts.len()).filter(|number| meeting.is_met(*number, id)).collect::<Vec<_>>();
     let between: Vec<Vec<usize>> = by_operator(deployment).into_iter().map(met).collect();
     let mut groups: Vec<Vec<usize>> = Vec::new();
@@ -262,8 +273,8 @@ pub fn groups(deployment: &Deployment, charts: &[&Chart]) -> Vec<Vec<usize>> {
 
 /// Whether an operator may have frames for several groups. Where the stack is full the oldest are squashed into one, which touches then
 /// what both touch.
-pub fn is_tied(deployment: &Deployment, charts: &[&Chart], groups: &[Vec<usize>]) -> bool {
-    let meeting = Meeting::of(deployment, charts);
+pub fn is_tied(deployment: &Deployment, catalogue: &Catalogue, charts: &[&Chart], groups: &[Vec<usize>]) -> bool {
+    let meeting = Meeting::of(deployment, catalogue, charts);
     let ids = by_operator(deployment);
     let met = |group: &&Vec<usize>| ids.iter().any(|id| group.iter().any(|number| meeting.is_met(*number, *id)));
     groups.iter().filter(met).count() > 1
@@ -271,23 +282,23 @@ pub fn is_tied(deployment: &Deployment, charts: &[&Chart], groups: &[Vec<usize>]
 
 /// A safe configuration that touches nothing that a group touches, whoever asks for it: of several one stands for all, since of each
 /// nothing is seen but that it interrupts.
-pub fn safe_elsewhere(deployment: &Deployment, charts: &[&Chart], numbers: &[usize]) -> Option<ConfigId> {
+pub fn safe_elsewhere(deployment: &Deployment, catalogue: &Catalogue, charts: &[&Chart], numbers: &[usize]) -> Option<ConfigId> {
     if numbers.len() == charts.len() {
         return None;
     }
-    let meeting = Meeting::of(deployment, charts);
+    let meeting = Meeting::of(deployment, catalogue, charts);
     let met = |id: ConfigId| numbers.iter().any(|number| meeting.is_met(*number, id));
     deployment.configurations.iter().filter(|c| c.safe).map(|c| c.id).find(|id| !met(*id))
 }
 
 /// What of an operator is followed with a group: what touches something that it touches. What touches nothing that anybody touches is
 /// followed with the first coordinator; what is safe and touches nothing of a group is what interrupts it ([`safe_elsewhere`]).
-pub fn operated(deployment: &Deployment, charts: &[&Chart], numbers: &[usize]) -> Vec<ConfigId> {
+pub fn operated(deployment: &Deployment, catalogue: &Catalogue, charts: &[&Chart], numbers: &[usize]) -> Vec<ConfigId> {
     let ids = by_operator(deployment);
     if numbers.len() == charts.len() {
         return ids.into_iter().collect();
     }
-    let meeting = Meeting::of(deployment, charts);
+    let meeting = Meeting::of(deployment, catalogue, charts);
     let followed = |id: &ConfigId| {
         let mut met = (0..charts.len()).filter(|number| meeting.is_met(*number, *id)).peekable();
         let safe = deployment.configuration(*id).is_some_and(|c| c.safe);

@@ -38,6 +38,7 @@ impl Graph<'_, '_> {
         self.safety(&mut found);
         self.warned(&mut found);
         self.promises(&mut found);
+        self.exclusives(&mut found);
         self.exports_stay(&mut found);
         found
     }

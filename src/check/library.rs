@@ -153,6 +153,9 @@ impl Compared<'_> {
             let all = [("configure", lost.configure), ("stop", lost.stop), ("destroy", lost.destroy)];
             words(all.iter().filter(|(_, is)| *is).map(|(word, _)| *word))
         });
+        // What the library holds and the declaration does not say, a plan would not heed.
+        let fails = library.exclusive.iter().any(|resource| !declared.exclusive.contains(resource));
+        found.add("exclusive", (&declared.exclusive, &library.exclusive), fails, |all: &Vec<_>| words(all.iter()));
         for Departure { what, declared, library, fails } in found.0 {
             let message =
                 format!("`{}`: {what} is declared as {declared}, the {} has {library}", self.ty, self.by.word());

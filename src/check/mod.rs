@@ -26,6 +26,7 @@ mod endless;
 mod ends;
 mod equivalence;
 mod explore;
+mod exclusive;
 mod exports;
 mod failing;
 #[cfg(any(test, feature = "internals"))]

@@ -119,7 +119,7 @@ impl<'a> Product<'a> {
         for number in numbers {
             outside.extend(outside_of(deployment, &views[*number], charts[*number]));
         }
-        let operator = coupling::operated(deployment, charts, numbers);
+        let operator = coupling::operated(deployment, catalogue, charts, numbers);
         let losable = deployment.configurations.iter().map(|c| (c.id, c.holds.is_some()));
         let losable = losable.filter(|(id, holds)| *holds || hears_loss(charts, numbers, *id)).collect();
         let minds_stopping = !operator.is_empty() || members.len() == 1;
@@ -132,7 +132,7 @@ impl<'a> Product<'a> {
             alike: Vec::new(),
             operator,
             others: numbers.len() < deployment.coordinators.len(),
-            elsewhere: coupling::safe_elsewhere(deployment, charts, numbers),
+            elsewhere: coupling::safe_elsewhere(deployment, catalogue, charts, numbers),
             minds_elsewhere: true,
             begins_anew: false,
             overflow: false,
@@ -158,7 +158,7 @@ impl<'a> Product<'a> {
             reacts: FxHashMap::default(),
             spare: Vec::new(),
         };
-        (product.worlds.judged, product.unjudged) = super::stands::judged(deployment, charts);
+        (product.worlds.judged, product.unjudged) = super::stands::judged(deployment, catalogue, charts);
         product.aside = Aside::of(deployment, &product.members, &product.losable);
         let names: Vec<_> = product.members.iter().map(|member| (member.name, member.of)).collect();
         product.watched = WatchedSubsystem::all(deployment, &names);

@@ -130,12 +130,12 @@ fn follow(
         left.insert(bound.told(Failed::Nothing, 0, effort.transitions));
         explored.complete = false;
     }
-    let groups = if effort.together { vec![all.clone()] } else { coupling::groups(deployment, charts) };
+    let groups = if effort.together { vec![all.clone()] } else { coupling::groups(deployment, catalogue, charts) };
     if groups.len() > 1 && !coupling::by_operator(deployment).is_empty() {
         left.insert(Bound::Begun.told(Failed::Nothing, 0, effort.transitions));
         explored.complete = false;
     }
-    if coupling::is_tied(deployment, charts, &groups) {
+    if coupling::is_tied(deployment, catalogue, charts, &groups) {
         left.insert(Bound::Tied.told(Failed::Nothing, 0, effort.transitions));
         explored.complete = false;
     }

@@ -9,7 +9,7 @@ use super::members::requester;
 use crate::limits;
 use crate::model::codes::CONF_HOLDS_NEVER;
 use crate::model::monitor::{Condition, ConditionKind};
-use crate::model::{Ask, ComponentName, ConfigId, Configuration, Deployment, Finding, RequestId, RunState, Target};
+use crate::model::{Ask, Catalogue, ComponentName, ConfigId, Configuration, Deployment, Finding, RequestId, RunState, Target};
 use crate::monitor::{Bank, InputSample, MonitorInput, state_value};
 use crate::stack::claims::{Claims, components};
 use crate::stack::{Request, Requester};
@@ -23,12 +23,12 @@ use std::time::Duration;
 
 /// Configurations of which it can be told: the platform shows what they look at, and nobody else can change that before
 /// their time is over. And whether there are others that look at run states, of which it cannot.
-pub fn judged(deployment: &Deployment, charts: &[&Chart]) -> (FxHashSet<ConfigId>, bool) {
+pub fn judged(deployment: &Deployment, catalogue: &Catalogue, charts: &[&Chart]) -> (FxHashSet<ConfigId>, bool) {
     let (mut all, mut left) = (FxHashSet::default(), false);
     if deployment.configurations.iter().all(|c| c.holds.is_none()) {
         return (all, left);
     }
-    let claims = Claims::new(deployment.configurations.iter());
+    let claims = Claims::new(deployment.configurations.iter(), catalogue);
     let names = deployment.coordinators.iter().map(|coordinator| requester(coordinator.name));
     let asked = charts.iter().map(|chart| coupling::asked(deployment, chart));
     let operator = (Requester::Operator, deployment.operator_applies().collect());

@@ -1,6 +1,6 @@
 //! The component types that a deployment declares.
 
-use crate::model::codes::{TYPE_CIRCLE, TYPE_UNKNOWN_OPERATION, TYPE_UNKNOWN_TYPE, TYPE_WITHOUT_CODE};
+use crate::model::codes::{TYPE_CIRCLE, TYPE_EXCLUSIVE, TYPE_UNKNOWN_OPERATION, TYPE_UNKNOWN_TYPE, TYPE_WITHOUT_CODE};
 use crate::model::finding::did_you_mean;
 use crate::model::{Catalogue, ComponentType, Deployment, Effect, Finding, Findings, Ident, TypeName};
 use std::collections::{BTreeSet, VecDeque};
@@ -56,9 +56,22 @@ pub fn check(deployment: &Deployment, catalogue: &Catalogue) -> Findings {
             }
         }
     }
+    findings.extend(deployment.types.iter().filter_map(|ty| exclusive(deployment, ty)));
     findings.extend(cycles(deployment, catalogue));
     findings.extend(without_code(deployment, catalogue));
     findings
+}
+
+/// What is held for itself, by a property that cannot say what.
+fn exclusive(deployment: &Deployment, ty: &ComponentType) -> Option<Finding> {
+    let (resource, (property, why)) = ty.exclusive.iter().find_map(|one| Some((one, one.misfit(ty)?)))?;
+    let path = format!("types.{}.exclusive", ty.name);
+    let help = match ty.properties.contains_key(&property) {
+        true => format!("mark it: `{property}: {{ type: string, tunable: unconfigured }}`"),
+        false => did_you_mean(property.as_str(), "properties", ty.properties.keys().map(Ident::as_str)),
+    };
+    let finding = Finding::error(TYPE_EXCLUSIVE, format!("{}: `{resource}` is no name of one thing: {why}", ty.name));
+    Some(finding.at(deployment.key_origins.get(&path).copied().unwrap_or(ty.origin)).path(path).help(help))
 }
 
 /// Orders that lead back to where they begin: inside a feedback loop none of these types could come first, and the name would

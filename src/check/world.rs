@@ -88,7 +88,7 @@ impl<'a> Worlds<'a> {
             deployment,
             configurations: deployment.configurations.iter().map(|c| (c.id, c.clone())).collect(),
             operator: deployment.operator_applies().collect(),
-            claims: Claims::new(deployment.configurations.iter()),
+            claims: Claims::new(deployment.configurations.iter(), catalogue),
             context: context(deployment),
             shapes: Shapes::new(undone),
             confirms: deployment.configurations.iter().any(|c| c.confirm.is_some()),

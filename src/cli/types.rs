@@ -146,6 +146,9 @@ fn one(out: &Output, ty: &ComponentType) {
             facts.push(format!("{word} {}", types.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")));
         }
     }
+    for resource in &ty.exclusive {
+        facts.push(format!("has `{resource}` for itself from configured on"));
+    }
     for fact in facts {
         out.line(format!("  {fact}"));
     }

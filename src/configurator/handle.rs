@@ -77,7 +77,7 @@ impl Configurator {
             clock: setup.clock.clone(),
             platform: setup.platform,
             limits: setup.limits,
-            claims: Claims::new(configurations.values()),
+            claims: Claims::new(configurations.values(), &setup.catalogue),
             configurations: Arc::new(configurations),
             force,
             operator: setup.operator.into_iter().collect(),

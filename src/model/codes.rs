@@ -206,6 +206,10 @@ codes! {
         "What a subsystem exports is there from *up* on, or from the event that `exports: { from }` names, until it has left: it says so \
          (`leaving: { says }`) and waits until its parent lets go (`until`). The parent asks for what touches it only between these, and holds \
          no frame of it any more when it lets go. The way shows what comes first.";
+    COMPOSE_EXCLUSIVE = "compose::exclusive", "two subsystems may hold the same thing at once",
+        "Components of two subsystems, or one of a subsystem and one of the parent, may come to hold a thing of one name (`exclusive` of their types), and \
+         both may be there at once: the second one would be refused it when it runs. What a subsystem may hold is judged from the event that begins it until \
+         `left/down` was heard, with every value that its file and its parent give. Give them different values, by a parameter, or begin one when the other is down.";
     COMPOSE_UNLEFT = "compose::unleft", "a subsystem takes away what it exports without being let go",
         "A subsystem with `leaving` destroys nothing that it exports before it has heard the event under `until`, so that nothing of its \
          parent is cut off; nor does it replace any or make it anew, and it passes on nothing of a subsystem of its own that does not promise it. \
@@ -256,6 +260,9 @@ codes! {
     TYPE_CIRCLE = "type::circle", "the order of types leads round in a circle",
         "`start_after` and `stop_before` say which types come first inside a feedback loop, where the data flow does not. Each of these \
          waits for another one of them, so no order fits, and the name would decide. Leave one of the names out.";
+    TYPE_EXCLUSIVE = "type::exclusive", "`exclusive` names a thing by a property that cannot stand in its name",
+        "What a component holds for itself must not become something else while it holds it: a property in braces is one of the type, of type string, int \
+         or bool, and `tunable: unconfigured`. Mark the property so, or name the thing without it.";
     TYPE_WITHOUT_CODE = "type::without_code", "a component of a type that is only declared, on a platform that needs its code",
         "Types under `types:` say which ports, properties and operations a component has, not what it does. The simulated \
          platform runs them all the same; the embedded platform needs the code, which comes with a library. Use \
@@ -342,6 +349,11 @@ codes! {
         "A component is destroyed from the run state unconfigured (or faulted). A configuration's destroy takes the legal path down by itself, so this is met only where single steps are executed: stop and clean up the component first.";
     ILLEGAL_TRANSITION = "conf::illegal_transition", "the run state does not allow this move",
         "Run states change along unconfigured, stopped, running, one step at a time, and from faulted only by cleanup. The component is in a state from which the move does not exist; most likely it changed by itself (a fault) since the plan was made. Look at its state and plan anew.";
+    RESOURCE_HELD = "conf::resource_held", "a component needs for itself what another one holds",
+        "A type may name things that a component of it needs for itself (`exclusive: [\"ethercat:{ifname}\"]`, with the value of a property inside): a bus, a \
+         serial line, a network interface. A component holds them from *configured* on, until it is *unconfigured* again, one at a time. Two components \
+         that come to the same name cannot both be configured: give one of them another value of the property, or bring the one that holds it \
+         to unconfigured first.";
     FAULTED_DEMANDED = "conf::faulted_demanded", "the state `faulted` cannot be demanded",
         "Faulted is a state that a component falls into by itself; nobody can bring it there, so no list may demand it. Demand unconfigured, stopped or running.";
     NOT_AN_OUT_PORT = "conf::not_an_out_port", "a connection begins at an out-port",

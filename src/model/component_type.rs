@@ -4,6 +4,7 @@ use super::finding::Origin;
 use super::injection::InjectionType;
 use super::monitor::{Condition, SELF, is_monitors};
 use super::names::{ComponentName, Ident, TypeName};
+use super::resource::Resource;
 use super::run_state::RunState;
 use super::value::{FitError, Value, ValueType};
 use rustc_hash::FxHashMap;
@@ -37,6 +38,9 @@ pub struct ComponentType {
     pub moves: Moves,
     /// What of its life cannot be undone.
     pub irreversible: Irreversible,
+    /// What a component of it needs for itself from *configured* on.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub exclusive: Vec<Resource>,
     /// Where it was declared (none for types of a library).
     #[serde(skip)]
     pub origin: Origin,
@@ -337,6 +341,7 @@ impl ComponentType {
             actuator: false,
             moves: Moves::default(),
             irreversible: Irreversible::default(),
+            exclusive: Vec::new(),
             origin: Origin::NONE,
         }
     }

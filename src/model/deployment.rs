@@ -80,6 +80,9 @@ pub struct Subsystem {
     pub own: Arc<Deployment>,
     /// Its activities that are those of the parent, each with the one it is updated in there.
     pub activities: BTreeMap<Ident, Ident>,
+    /// What its components may hold for themselves, to any depth and whatever values its files and its parent give; known where it is
+    /// followed.
+    pub holds: BTreeSet<String>,
     /// Its file, as it is named.
     pub file: String,
     /// Where it is named.

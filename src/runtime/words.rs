@@ -5,7 +5,7 @@ use super::call::Reply;
 use super::component::{Arguments, Component, Context, HookResult};
 use super::value::PortValue;
 use crate::model::monitor::Condition;
-use crate::model::{Effect, InjectionParameter, Irreversible, Tunable, TypeName};
+use crate::model::{Effect, InjectionParameter, Irreversible, Resource, Tunable, TypeName};
 use std::ops::RangeInclusive;
 use std::sync::Arc;
 
@@ -45,6 +45,15 @@ impl<C: Component> Builder<C> {
     /// When `other` is no type name.
     pub fn stop_before(&mut self, other: &str) -> &mut Self {
         self.ty(|ty| ty.stop_before.push(TypeName::new(other).expect("a component type's name")))
+    }
+
+    /// What a component needs for itself from *configured* on: a name in which `{property}` is the value of a property that is
+    /// tunable only while *unconfigured*.
+    ///
+    /// # Panics
+    /// When it is no such name.
+    pub fn exclusive(&mut self, resource: &str) -> &mut Self {
+        self.ty(|ty| ty.exclusive.push(Resource::parse(resource).expect("the name of what it needs")))
     }
 
     /// Which moves of its run state cannot be undone.

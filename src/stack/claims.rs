@@ -1,9 +1,10 @@
 //! What a request may touch, known from its text: requests that have nothing to do with each other are carried out at the
 //! same time (semantics: *Requests*).
 
+use super::contenders::{contenders, may_hold};
 use super::request::Request;
 use crate::model::names::is_within;
-use crate::model::{Ask, ChangeKind, ComponentName, ConfigId, Configuration, Ident, Target};
+use crate::model::{Ask, Catalogue, ChangeKind, ComponentName, ConfigId, Configuration, Ident, Target};
 use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
 use std::collections::BTreeMap;
@@ -27,6 +28,10 @@ impl Claim {
             self.bits.resize(at / 64 + 1, 0);
         }
         self.bits[at / 64] |= 1 << (at % 64);
+    }
+
+    fn has(&self, at: usize) -> bool {
+        self.bits.get(at / 64).is_some_and(|bits| bits & 1 << (at % 64) != 0)
     }
 
     /// Takes `other` in.
@@ -55,12 +60,14 @@ pub struct Claims {
     of: FxHashMap<ConfigId, Claim>,
     /// The components with their numbers.
     numbers: FxHashMap<ComponentName, usize>,
+    /// Components that may hold what others may hold, with these.
+    contenders: BTreeMap<ComponentName, Vec<ComponentName>>,
 }
 
 impl Claims {
     /// What each configuration claims: the components that it and those of its group name, and what those may be connected to
-    /// that it replaces; with `_default` all of its file.
-    pub fn new<'c>(configurations: impl Iterator<Item = &'c Configuration> + Clone) -> Self {
+    /// that it replaces; with `_default` all of its file; with each component those that may need the same thing for themselves.
+    pub fn new<'c>(configurations: impl Iterator<Item = &'c Configuration> + Clone, types: &Catalogue) -> Self {
         let most = configurations.clone().map(|configuration| configuration.changes.len()).max().unwrap_or_default();
         let mut numbers: FxHashMap<ComponentName, usize> = FxHashMap::default();
         numbers.reserve(most);
@@ -99,6 +106,15 @@ impl Claims {
                 numbers.iter().filter(|(name, _)| name.prefix() == scope).for_each(|(_, at)| claim.set(*at));
             }
         }
+        let contenders = contenders(&may_hold(configurations.clone(), types));
+        let rivals: Vec<(usize, Vec<usize>)> =
+            contenders.iter().map(|(name, all)| (numbers[name], all.iter().map(|rival| numbers[rival]).collect())).collect();
+        for claim in of.values_mut() {
+            let mut more = Claim::default();
+            let claimed = rivals.iter().filter(|(at, _)| claim.has(*at));
+            claimed.flat_map(|(_, rivals)| rivals).for_each(|at| more.set(*at));
+            claim.join(&more);
+        }
         let mut groups: BTreeMap<Ident, Claim> = BTreeMap::new();
         for configuration in configurations.clone() {
             if let (Some(group), Some(claim)) = (configuration.group, of.get(&configuration.id)) {
@@ -110,13 +126,17 @@ impl Claims {
                 claim.join(&groups[&group]);
             }
         }
-        Self { of, numbers }
+        Self { of, numbers, contenders }
     }
 
-    /// Adds one that names components only, and belongs to no group; in the place of one of that name.
+    /// Adds one that names components only, and belongs to no group; in the place of one of that name. What a value that it gives
+    /// makes them need is not known: the step that would take it is looked at when it comes.
     pub fn add(&mut self, configuration: &Configuration) {
         let mut claim = Claim::default();
-        for_each_named(configuration, &mut |component| {
+        let mut named = components(configuration);
+        let more = named.iter().flat_map(|name| self.contenders.get(name)).flatten().copied().collect::<Vec<_>>();
+        named.extend(more);
+        named.into_iter().for_each(|component| {
             let next = self.numbers.len();
             claim.set(*self.numbers.entry(component).or_insert(next));
         });
@@ -221,7 +241,7 @@ mod tests {
             one("source", set("a")),
             one("other", set("c")),
         ];
-        let claims = Claims::new(all.iter());
+        let claims = Claims::new(all.iter(), &Catalogue::new());
         let of = |n: usize| claims.of([&Request::new(RequestId(0), Ask::Apply(all[n].id), Requester::Operator)]);
         assert!(of(1).meets(&of(2)) && of(1).meets(&of(0)) && !of(1).meets(&of(3)));
     }

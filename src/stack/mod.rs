@@ -12,6 +12,7 @@
 pub mod answer;
 mod batch;
 pub mod claims;
+pub mod contenders;
 mod desk;
 mod effort;
 mod leave;

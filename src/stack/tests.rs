@@ -421,7 +421,7 @@ fn what_has_given_up_a_request_goes_with_its_answer() {
         configuration
     };
     let all = [configuration("a"), configuration("b"), configuration("c")];
-    let claims = super::claims::Claims::new(all.iter());
+    let claims = super::claims::Claims::new(all.iter(), &Catalogue::new());
     let request = |ask| super::Request::new(RequestId(0), ask, Requester::Operator);
     let (apply, undo) = (|n: usize| request(Ask::Apply(all[n].id)), |n: usize| request(Ask::UndoOf(all[n].id)));
     let under_way = || {

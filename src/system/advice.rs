@@ -3,7 +3,7 @@
 use super::violation::MemberClass;
 use super::{View, Violation};
 use crate::model::finding::did_you_mean;
-use crate::model::{ComponentName, ComponentType, Finding, MemberRef, Origin, Tunable, TypeName, ValueType};
+use crate::model::{ComponentName, ComponentType, Finding, Ident, MemberRef, Origin, Resource, Tunable, TypeName, ValueType};
 
 impl Violation {
     /// It as a finding, at no place yet: what is wrong, where what it is about was declared, what to do. `view` is the
@@ -61,6 +61,7 @@ impl Violation {
             | Self::UnknownActivity { .. }
             | Self::Exists(_)
             | Self::Transition { .. }
+            | Self::ResourceHeld { .. }
             | Self::NotUnconfigured { .. }
             | Self::StillConnected { .. }
             | Self::AlreadyConnected { .. }
@@ -90,6 +91,15 @@ impl Violation {
                 let types: Vec<&ComponentType> =
                     types.iter().filter_map(|ty| view.types().get(*ty)).map(AsRef::as_ref).collect();
                 near_member(*what, *member, &types)
+            }
+            Self::ResourceHeld { component, by, .. } => {
+                let node = view.component(*component);
+                let given: Vec<Ident> =
+                    node.iter().flat_map(|node| &node.ty.exclusive).flat_map(Resource::properties).collect();
+                match given.first() {
+                    Some(property) => format!("bring `{by}` to unconfigured first, or give one of the two another `{property}`"),
+                    None => format!("bring `{by}` to unconfigured first: one component at a time has it"),
+                }
             }
             Self::Exists(name) => format!("destroy `{name}` in the same configuration, or choose another name"),
             Self::StillConnected { links, .. } => {

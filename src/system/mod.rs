@@ -5,6 +5,7 @@
 
 mod advice;
 pub mod diff;
+pub mod exclusive;
 mod node;
 mod overlay;
 mod picture;

@@ -4,8 +4,8 @@
 //! ([`Node::born`](super::ComponentNode::born)).
 
 use super::step::{move_allowed, sample_allowed, value_allowed};
-use super::{Slot, System, View, Violation};
-use crate::model::{Step, Value};
+use super::{Slot, System, View, Violation, exclusive};
+use crate::model::{Step, Transition, Value};
 use petgraph::stable_graph::NodeIndex;
 
 /// Where a slot is: its component's handle, and the place of the property or port in the type's order.
@@ -46,7 +46,10 @@ impl SlotHandle {
         let mut found = Vec::new();
         let Some(node) = system.node_at(self.node) else { return vec![Violation::UnknownComponent(step.component())] };
         match step {
-            Step::State { transition, .. } => move_allowed(node, *transition, &mut found),
+            Step::State { transition, .. } => {
+                move_allowed(node, *transition, &mut found);
+                found.extend((*transition == Transition::Configure).then(|| exclusive::taken(node, system)).flatten());
+            }
             Step::PropertySet { property, value } => {
                 let declared = node.ty.properties.values().nth(self.at).expect("a place is of the type");
                 value_allowed(node, *property, declared, value, &mut found);
@@ -65,7 +68,10 @@ impl SlotHandle {
     pub fn allows(self, step: &Step, system: &System) -> bool {
         let Some(node) = system.node_at(self.node) else { return false };
         match step {
-            Step::State { transition, .. } => transition.allowed_in(node.state),
+            Step::State { transition, .. } => {
+                transition.allowed_in(node.state)
+                    && (*transition != Transition::Configure || exclusive::taken(node, system).is_none())
+            }
             Step::PropertySet { .. } => {
                 node.ty.properties.values().nth(self.at).is_some_and(|p| p.tunable.allows(node.state))
             }

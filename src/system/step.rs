@@ -5,7 +5,7 @@
 
 pub use super::touch::{absolute, components, touch_each, touches};
 use super::violation::brief;
-use super::{ComponentNode, Driven, MemberClass, View, ViewMut, Violation};
+use super::{ComponentNode, Driven, MemberClass, View, ViewMut, Violation, exclusive};
 use crate::model::{
     Call, ComponentName, Direction, Effect, Ident, MemberRef, Policy, PortType, PropertyType, RunState, Step,
     Transition, TypeName, Value, ValueType,
@@ -53,7 +53,12 @@ pub fn precondition(step: &Step, view: &impl View) -> Vec<Violation> {
     match step {
         Step::State { component, transition } => match view.component(*component) {
             None => found.push(Violation::UnknownComponent(*component)),
-            Some(node) => move_allowed(node, *transition, &mut found),
+            Some(node) => {
+                move_allowed(node, *transition, &mut found);
+                if *transition == Transition::Configure {
+                    found.extend(exclusive::taken(node, view));
+                }
+            }
         },
         Step::Create { component, ty, properties, .. } => create_allowed(*component, *ty, properties, view, &mut found),
         Step::Destroy { component } => destroy_allowed(*component, view, &mut found),

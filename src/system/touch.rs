@@ -2,8 +2,8 @@
 //!
 //! [`step`]: super::step
 
-use super::View;
-use crate::model::{Call, ComponentName, Effect, MemberRef, Policy, Step, Tunable};
+use super::{View, exclusive};
+use crate::model::{Call, ComponentName, Effect, MemberRef, Policy, Step, Transition, Tunable};
 use smallvec::{SmallVec, smallvec};
 use std::fmt;
 
@@ -95,7 +95,7 @@ impl Touch {
     }
 }
 
-/// What a step touches; never more than two slots.
+/// What a step touches; seldom more than two slots.
 pub type Touches = SmallVec<[Touch; 2]>;
 
 /// What a step is about, where each thing is one: what it writes, makes, takes away, links or calls.
@@ -125,7 +125,16 @@ pub fn touches(step: &Step, undo: Option<&Call>, before: &impl View) -> Touches 
 #[inline]
 pub fn touch_each(step: &Step, undo: Option<&Call>, before: &impl View, each: &mut impl FnMut(Touch)) {
     match step {
-        Step::State { component, .. } => each(Touch::new(Slot::State(*component), Access::Write)),
+        Step::State { component, transition } => {
+            each(Touch::new(Slot::State(*component), Access::Write));
+            // Where one of these two is done or undone it is configured, and nobody else holds what it needs.
+            if matches!(transition, Transition::Configure | Transition::Cleanup)
+                && let Some(node) = before.component(*component)
+            {
+                let rivals = exclusive::rivals(node, before);
+                rivals.into_iter().for_each(|(other, ..)| each(Touch::new(Slot::State(other), Access::Need)));
+            }
+        }
         Step::Create { component, .. } | Step::Destroy { component } => {
             each(Touch::new(Slot::Component(*component), Access::Write));
         }

@@ -64,6 +64,8 @@ pub enum Violation {
     Exists(ComponentName),
     #[error("`{component}` cannot {transition}: it is {state}")]
     Transition { component: ComponentName, transition: Transition, state: RunState },
+    #[error("`{component}` needs `{resource}` for itself, and `{by}` holds it")]
+    ResourceHeld { component: ComponentName, resource: String, by: ComponentName },
     #[error("`{component}` is {state}; only an unconfigured or faulted component can be destroyed")]
     NotUnconfigured { component: ComponentName, state: RunState },
     #[error("`{component}` still has connections: {}", list(links))]
@@ -171,6 +173,7 @@ impl Violation {
             Self::UnknownActivity { .. } => codes::UNKNOWN_ACTIVITY,
             Self::Exists(_) => codes::COMPONENT_EXISTS,
             Self::Transition { .. } => codes::ILLEGAL_TRANSITION,
+            Self::ResourceHeld { .. } => codes::RESOURCE_HELD,
             Self::NotUnconfigured { .. } => codes::NOT_UNCONFIGURED,
             Self::StillConnected { .. } => codes::STILL_CONNECTED,
             Self::UnknownMember { what: MemberClass::Port, .. } => codes::UNKNOWN_PORT,
@@ -221,6 +224,7 @@ impl Violation {
             Self::UnknownComponent(_)
             | Self::Exists(_)
             | Self::Transition { .. }
+            | Self::ResourceHeld { .. }
             | Self::NotUnconfigured { .. }
             | Self::StillConnected { .. }
             | Self::AlreadyConnected { .. }
@@ -270,6 +274,7 @@ impl Violation {
             | Self::UnknownActivity { .. }
             | Self::Exists(_)
             | Self::Transition { .. }
+            | Self::ResourceHeld { .. }
             | Self::NotUnconfigured { .. }
             | Self::StillConnected { .. }
             | Self::PropertyCount { .. } => [None, None],

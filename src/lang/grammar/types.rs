@@ -87,6 +87,14 @@ pub static TYPE: Object = Object {
             "irreversible: [destroy]",
             ("irreversible: [start]", TEXT_BAD_VALUE),
         ),
+        key(
+            "exclusive",
+            Form::Several(&Form::Text),
+            "What a component needs for itself, by name, `{property}` being the value of one of its properties that is `tunable: unconfigured`. It holds that from \
+             *configured* on until it is *unconfigured* again, one component at a time, in all of a deployment: a second one is refused.",
+            "exclusive: [can0]",
+            ("exclusive: [\"can{\"]", TEXT_BAD_VALUE),
+        ),
     ],
 };
 

@@ -1,11 +1,11 @@
 //! Component types declared in a deployment.
 
-use super::{choice, condition, name, value};
+use super::{choice, condition, name, text, value};
 use crate::lang::grammar::{EFFECT, OPERATION, PORT, PROPERTY, TYPE};
 use crate::lang::tree::{Cx, Entry, Fields, Kind, Node};
 use crate::model::{
-    ComponentType, Direction, Effect, Finding, Ident, OperationType, PortType, PropertyType, Tunable, TypeName,
-    ValueType, codes,
+    ComponentType, Direction, Effect, Finding, Ident, OperationType, PortType, PropertyType, Resource, Tunable,
+    TypeName, ValueType, codes,
 };
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -53,8 +53,26 @@ fn component_type(cx: &mut Cx, entry: Entry) -> Option<ComponentType> {
         let lost = &mut ty.irreversible;
         *[&mut lost.configure, &mut lost.stop, &mut lost.destroy][which] = true;
     }
+    ty.exclusive = resources(cx, &mut fields);
     fields.finish(cx);
     type_name.map(|_| ty)
+}
+
+/// What is needed for itself, each with the mistake in its text.
+fn resources(cx: &mut Cx, fields: &mut Fields) -> Vec<Resource> {
+    let mut read = Vec::new();
+    for node in fields.several(cx, "exclusive") {
+        let Some(text) = text(cx, &node, "`exclusive`", "exclusive: [can0]") else { continue };
+        match Resource::parse(&text) {
+            Ok(resource) => read.push(resource),
+            Err(why) => cx.report(
+                Finding::error(codes::TEXT_BAD_VALUE, format!("`{text}` names nothing that a component could hold: {why}"))
+                    .at(node.origin)
+                    .help("write a name, `exclusive: [can0]`, or one with the value of a property, `exclusive: [\"can:{bus}\"]`"),
+            ),
+        }
+    }
+    read
 }
 
 fn doc(cx: &mut Cx, fields: &mut Fields) -> String {

@@ -319,6 +319,9 @@ fn component_type(out: &mut String, ty: &ComponentType) {
             _ = writeln!(body, "    {key}: {}", list(marks));
         }
     }
+    if !ty.exclusive.is_empty() {
+        _ = writeln!(body, "    exclusive: {}", list(ty.exclusive.iter().map(|name| text(&name.to_string()))));
+    }
     if body.is_empty() {
         out.truncate(out.trim_end().len());
         out.push_str(" {}\n");

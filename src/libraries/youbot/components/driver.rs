@@ -111,6 +111,7 @@ impl Component for Driver {
              stops or sinks onto them. An arm that is not heard any more for 20 ms: e_EC_TIMEOUT.",
         )
         .actuator()
+        .exclusive("ethercat:{ifname}")
         .start_after("youbot.World")
         .on_configure(|c, _| {
             c.drives = Drives::new(radians(PARK_POSE_DEG));
