@@ -7,7 +7,7 @@ use super::shared_list::SharedList;
 use super::state::{Answers, Failed, Interrupted, Move, Next, Nexts, ProductState, States, bit, index, one};
 use crate::limits;
 use crate::model::{Ask, ConfigId, EventName, Findings, Verdict, codes};
-use crate::stack::{ActiveBatch, Arrived, Batch, Desk, Request, Requester, Why, given_up_of};
+use crate::stack::{ActiveBatch, Arrived, Batch, Desk, LedDown, Request, Requester, Why, given_up_of};
 use crate::statechart::{EventId, NodeId};
 use smallvec::SmallVec;
 use std::rc::Rc;
@@ -296,8 +296,8 @@ impl Product<'_> {
     /// The next batch that may begin does: its number.
     fn begin_next(&self, state: &mut ProductState) -> Option<u32> {
         let ProductState { desk, world, leaving, safe, .. } = state;
-        let alone = |batch: &Batch| *leaving && self.worlds.goes_alone(*world, batch);
-        if desk.waiting().any(alone) || !safe.is_empty() {
+        let alone = |batch: &Batch| (*leaving && self.worlds.goes_alone(*world, batch)).then_some(LedDown::Whole);
+        if desk.waiting().any(|batch| alone(batch).is_some()) || !safe.is_empty() {
             let asked = safe.iter().map(|request| request.ask);
             let safe: Vec<ConfigId> =
                 asked.filter_map(|ask| if let Ask::Apply(id) = ask { Some(id) } else { None }).collect();

@@ -9,12 +9,12 @@ use super::simulated;
 use super::trace::{Does, TraceStep};
 use super::universe::Universe;
 use super::verdict::CheckVerdict;
-use crate::stack::contenders::may_hold;
 use crate::model::subsystem::ExportKind;
 use crate::model::{
     Catalogue, Change, ChangeKind, ComponentName, ComponentType, ConfigId, Configuration, Deployment, EventName,
     Finding, Ident, StateEntry, StateList, Subsystem, Target, Value, ValueType, Wanted,
 };
+use crate::stack::contenders::may_hold;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 

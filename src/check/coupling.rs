@@ -6,8 +6,8 @@ use super::interface::told_by;
 use super::members::hears_loss;
 use crate::model::codes::{COORD_SHARED, DEPLOY_EVENT_UNHEARD};
 use crate::model::{
-    Ask, Catalogue, ComponentName, ConfigId, Configuration, Deployment, EventName, Finding, Findings, Ident, RequestId, Severity,
-    Subsystem, Target,
+    Ask, Catalogue, ComponentName, ConfigId, Configuration, Deployment, EventName, Finding, Findings, Ident, RequestId,
+    Severity, Subsystem, Target,
 };
 use crate::stack::claims::{self, Claim, Claims};
 use crate::stack::contenders::may_hold;
@@ -282,7 +282,12 @@ pub fn is_tied(deployment: &Deployment, catalogue: &Catalogue, charts: &[&Chart]
 
 /// A safe configuration that touches nothing that a group touches, whoever asks for it: of several one stands for all, since of each
 /// nothing is seen but that it interrupts.
-pub fn safe_elsewhere(deployment: &Deployment, catalogue: &Catalogue, charts: &[&Chart], numbers: &[usize]) -> Option<ConfigId> {
+pub fn safe_elsewhere(
+    deployment: &Deployment,
+    catalogue: &Catalogue,
+    charts: &[&Chart],
+    numbers: &[usize],
+) -> Option<ConfigId> {
     if numbers.len() == charts.len() {
         return None;
     }

@@ -155,9 +155,7 @@ impl Desks {
 
     /// The next batch that may begin does: its number. None goes alone.
     pub fn begin_next(&self, desk: &mut KeptDesk, claims: &Claims) -> Option<u32> {
-        self.once(&self.begins, desk, (), |desk, ()| {
-            desk.begin_next(claims, |_| false, &[]).map(|active| active.number)
-        })
+        self.once(&self.begins, desk, (), |desk, ()| desk.begin_next(claims, |_| None, &[]).map(|active| active.number))
     }
 
     /// [`Desk::all_answered`].

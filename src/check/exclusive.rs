@@ -22,7 +22,8 @@ impl Product<'_> {
     /// A subsystem that is begun, who else may hold something that it may hold, and what.
     fn contended(&self, state: &ProductState) -> Option<(usize, Rival, String)> {
         let there = |at: usize| state.children & begun(at) != 0;
-        for (at, child) in self.children.iter().enumerate().filter(|(at, child)| there(*at) && !child.holds.is_empty()) {
+        for (at, child) in self.children.iter().enumerate().filter(|(at, child)| there(*at) && !child.holds.is_empty())
+        {
             for (other, rival) in self.children.iter().enumerate().skip(at + 1).filter(|(other, _)| there(*other)) {
                 if let Some(name) = rival.holds.intersection(&child.holds).next() {
                     return Some((other, Rival::Subsystem(child.path), name.clone()));
@@ -65,11 +66,15 @@ impl Graph<'_, '_> {
             let (message, help) = match rival {
                 Rival::Subsystem(other) => (
                     format!("`{path}` and `{other}` may both hold `{name}`, and one is begun while the other is there"),
-                    format!("give them different values for what stands in that name, or begin one when `{other}/down` was heard"),
+                    format!(
+                        "create them with different values of what stands in that name, or begin one when `{other}/down` was heard"
+                    ),
                 ),
                 Rival::Own(component) => (
                     format!("`{component}` holds `{name}`, which `{path}` may need while it is there"),
-                    format!("bring `{component}` to unconfigured before `{path}` is begun, or give one of the two another value"),
+                    format!(
+                        "bring `{component}` to unconfigured before `{path}` is begun, or give one of the two another value"
+                    ),
                 ),
             };
             let origin = self.product.deployment.subsystems.iter().find(|one| one.name == path).map(|one| one.origin);

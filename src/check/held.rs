@@ -5,7 +5,7 @@ use super::desks::PlainBatch;
 use super::outcome::{ConcurrentWork, Held, Went, WorldId};
 use super::world::Worlds;
 use crate::model::ConfigId;
-use crate::stack::{Batch, Frame, FrameId, Request, Requester, Stack, held};
+use crate::stack::{Batch, Frame, FrameId, LedDown, Request, Requester, Stack, held};
 use smallvec::SmallVec;
 
 impl Worlds<'_> {
@@ -96,7 +96,7 @@ impl Worlds<'_> {
 
     /// Whether a batch would go alone while everything is led down.
     pub fn goes_alone(&self, id: WorldId, batch: &Batch) -> bool {
-        self.get(id).is_some_and(|world| world.stack.goes_alone(batch))
+        self.get(id).is_some_and(|world| world.stack.goes_alone(batch, LedDown::Whole))
     }
 
     /// Of what an operator has frames in force, the oldest first.

@@ -25,8 +25,8 @@ mod effort;
 mod endless;
 mod ends;
 mod equivalence;
-mod explore;
 mod exclusive;
+mod explore;
 mod exports;
 mod failing;
 #[cfg(any(test, feature = "internals"))]

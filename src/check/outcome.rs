@@ -1,7 +1,7 @@
 //! What is said of worlds: where something leads to, and what a batch or a safe configuration comes to in one.
 
 use crate::model::{ConfigId, Findings, Verdict};
-use crate::stack::{Ending, Endings, FrameId, Group, Request, Requester};
+use crate::stack::{Ending, Endings, FrameId, Group, LedDown, Request, Requester};
 use crate::transaction::{Stopping, endings};
 use smallvec::SmallVec;
 use std::rc::Rc;
@@ -50,7 +50,7 @@ pub struct ConcurrentWork {
     /// Its pushes have taken their place.
     pub placed: bool,
     /// It has begun alone, while everything is led down.
-    pub alone: bool,
+    pub alone: Option<LedDown>,
 }
 
 /// What the first requests of a batch come to.

@@ -423,7 +423,7 @@ impl<'a> Product<'a> {
 
 /// How a batch under way has begun; `desk`: as it stood at the state's desk.
 pub(super) fn as_begun(desk: &Desk, state: &ProductState, number: u32) -> ConcurrentWork {
-    let alone = desk.active(number).is_some_and(|active| active.alone);
+    let alone = desk.active(number).and_then(|active| active.alone);
     ConcurrentWork { joined: state.joined.contains(&number), alone, ..ConcurrentWork::default() }
 }
 

@@ -128,7 +128,7 @@ pub(super) fn goes(state: &ProductState, requests: &[Request]) -> ConcurrentWork
     let one =
         |of: &Request| requests.iter().any(|request| same(std::slice::from_ref(of), std::slice::from_ref(request)));
     let active = state.desk.under_way().iter().find(|active| active.batch.requests.iter().any(one));
-    ConcurrentWork { alone: active.is_some_and(|active| active.alone), ..ConcurrentWork::default() }
+    ConcurrentWork { alone: active.and_then(|active| active.alone), ..ConcurrentWork::default() }
 }
 
 /// Whether something is under way that was interrupted, or given up.

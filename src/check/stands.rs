@@ -9,7 +9,9 @@ use super::members::requester;
 use crate::limits;
 use crate::model::codes::CONF_HOLDS_NEVER;
 use crate::model::monitor::{Condition, ConditionKind};
-use crate::model::{Ask, Catalogue, ComponentName, ConfigId, Configuration, Deployment, Finding, RequestId, RunState, Target};
+use crate::model::{
+    Ask, Catalogue, ComponentName, ConfigId, Configuration, Deployment, Finding, RequestId, RunState, Target,
+};
 use crate::monitor::{Bank, InputSample, MonitorInput, state_value};
 use crate::stack::claims::{Claims, components};
 use crate::stack::{Request, Requester};

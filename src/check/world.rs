@@ -200,7 +200,7 @@ impl<'a> Worlds<'a> {
             places: &[],
             joined: false,
             placed: false,
-            alone: false,
+            alone: None,
         }
     }
 

@@ -17,7 +17,7 @@ use crate::model::{Ask, ConfigId, Configuration, DeploymentLimits, Ident, Reques
 use crate::plan::PlanContext;
 use crate::platform::{Platform, PlatformEvent};
 use crate::stack::claims::Claims;
-use crate::stack::{Arrived, Batch, Desk, FrameId, Requester, Why, World};
+use crate::stack::{Arrived, Batch, Desk, FrameId, LedDown, Requester, Why, World};
 use crate::time::{Clock, Receiver, RecvError, Time};
 use rustc_hash::{FxHashMap, FxHashSet};
 use smallvec::SmallVec;
@@ -95,6 +95,8 @@ pub(super) struct Engine {
     pub began: Option<StoppingBegan>,
     /// When the event that ends the deployment came, and it is not down since.
     pub leaving: Option<Moment>,
+    /// Subsystems that are led down by themselves, as of so many changes.
+    pub leaving_inside: (usize, SmallVec<[Ident; 2]>),
     /// What takes its time has been broken off, since force is wanted.
     pub hurried: bool,
 }
@@ -128,6 +130,7 @@ impl Engine {
             taking_down: false,
             began: None,
             leaving: None,
+            leaving_inside: (0, SmallVec::new()),
             hurried: false,
         }
     }
@@ -202,9 +205,14 @@ impl Engine {
     /// The next batch that may begin, by its number.
     pub fn begin_next(&mut self) -> Option<u32> {
         self.heed_leaving();
-        let Self { desk, given, world, leaving, running, .. } = self;
+        let Self { desk, given, world, leaving, leaving_inside, running, .. } = self;
         let safe: SmallVec<[ConfigId; 1]> = running.iter().filter_map(Running::safe_configuration).collect();
-        let alone = |batch: &Batch| leaving.is_some() && world.stack.goes_alone(batch);
+        let whole = leaving.is_some().then_some(LedDown::Whole);
+        let led: SmallVec<[LedDown; 2]> = match whole {
+            Some(whole) => SmallVec::from_slice(&[whole]),
+            None => leaving_inside.1.iter().copied().map(LedDown::Inside).collect(),
+        };
+        let alone = |batch: &Batch| led.iter().copied().find(|led| world.stack.goes_alone(batch, *led));
         desk.begin_next(&given.claims, alone, &safe).map(|active| active.number)
     }
 
@@ -371,6 +379,7 @@ impl Engine {
             self.given.subsystems.iter().filter(|(_, all)| down(all)).map(|(path, _)| *path).collect();
         for path in down {
             if self.world.settle_down_in(path) {
+                self.counts.leads(path, false);
                 self.forget_confirmations();
                 self.changed();
                 if let Some(progress) = &self.given.progress {

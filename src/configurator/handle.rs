@@ -214,6 +214,11 @@ impl ConfiguratorHandle {
         self.inner.post.leaving(leaving);
     }
 
+    /// The event that ends the subsystem of that path was taken up: the same of it, until it is empty, or (`false`) brought up again.
+    pub fn leaving_inside(&self, path: Ident, leaving: bool) {
+        self.inner.post.leaving_inside(path, leaving);
+    }
+
     /// Whether the event that ends the deployment was raised, and it is neither down nor brought up since.
     pub fn is_leaving(&self) -> bool {
         self.inner.post.is_leaving()

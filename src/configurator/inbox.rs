@@ -6,13 +6,13 @@
 use super::control::{ControlCommand, UrgentCommand};
 use super::request::{Batch, Request};
 use crate::limits;
-use crate::model::{ComponentSnapshot, EventName, Snapshot};
+use crate::model::{ComponentSnapshot, EventName, Ident, Snapshot};
 use crate::platform::{ObserveError, PlatformEvent};
 use crate::stack::Requester;
 use crate::time::{Clock, Receiver, Sender, TrySendError};
 use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// A call of the platform, by its number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -58,6 +58,9 @@ pub(super) struct Counts {
     pub hurried: AtomicBool,
     /// The event that ends the deployment came, and it is not down since.
     pub leaving: AtomicBool,
+    /// The same of subsystems, by their paths; and how often that changed.
+    pub leaving_inside: Mutex<BTreeSet<Ident>>,
+    pub leaving_changes: AtomicUsize,
     reports: AtomicUsize,
     commands: AtomicUsize,
     control: AtomicUsize,
@@ -89,6 +92,15 @@ pub(super) fn new(clock: &Clock) -> (Post, Receiver<Mail>) {
 }
 
 impl Counts {
+    /// A subsystem is led down from now on, or it is no more.
+    pub fn leads(&self, path: Ident, down: bool) {
+        let mut all = self.leaving_inside.lock().unwrap_or_else(PoisonError::into_inner);
+        let changed = if down { all.insert(path) } else { all.remove(&path) };
+        if changed {
+            self.leaving_changes.fetch_add(1, Ordering::Release);
+        }
+    }
+
     /// A report was taken out: its room is free again.
     pub fn report_taken(&self) {
         self.reports.fetch_sub(1, Ordering::AcqRel);
@@ -196,6 +208,11 @@ impl Post {
     /// nobody, for it changes nothing of what is under way.
     pub fn leaving(&self, leaving: bool) {
         self.counts.leaving.store(leaving, Ordering::Release);
+    }
+
+    /// Says it of a subsystem.
+    pub fn leaving_inside(&self, path: Ident, leaving: bool) {
+        self.counts.leads(path, leaving);
     }
 
     /// Whether it is led down.

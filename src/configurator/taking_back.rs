@@ -10,13 +10,13 @@ use super::engine::Engine;
 use super::repair::By;
 use super::request::{Reason, Request};
 use crate::model::{Ask, ConfigId, RequestId};
-use crate::stack::{Batch, Frame, FrameId, Inverse, Op, Planned, Requester, Why, transaction};
+use crate::stack::{Batch, Frame, FrameId, Inverse, LedDown, Op, Planned, Requester, Why, transaction};
 use crate::system::step;
 use crate::time::Time;
 use crate::transaction::{Input, PartEnd, Transaction};
 use std::collections::BTreeSet;
-use std::sync::Arc;
 use std::sync::atomic::Ordering;
+use std::sync::{Arc, PoisonError};
 
 impl Engine {
     /// From now on operators are refused, also those that wait.
@@ -36,12 +36,17 @@ impl Engine {
     /// force may do it, which `check` does not follow); none: nothing of it is left. What is safe is never refused.
     pub(super) fn without_refused(&mut self, mut batch: Batch) -> Option<Batch> {
         let stopping = self.began.is_some();
-        if stopping || self.leaving.is_some() {
+        let led = |ask: Ask| match ask {
+            Ask::Apply(id) | Ask::UndoOf(id) => self.leaving_inside.1.iter().any(|path| LedDown::Inside(*path).has(id)),
+            _ => false,
+        };
+        if stopping || self.leaving.is_some() || batch.requests.iter().any(|request| led(request.ask)) {
+            let all = stopping || self.leaving.is_some();
             let safe = |id: ConfigId| self.given.configurations.get(&id).is_some_and(|c| c.safe);
             let refused = |request: &Request| {
                 let safe = matches!(request.ask, Ask::Apply(id) if safe(id));
                 let asked = request.why == Why::Asked && request.requester == Requester::Operator;
-                asked && !safe && (stopping || !request.force)
+                asked && !safe && (all || led(request.ask)) && (stopping || !request.force)
             };
             let out: Vec<Request> = batch.requests.iter().copied().filter(refused).collect();
             batch.requests.retain(|request| !out.contains(request));
@@ -107,9 +112,15 @@ impl Engine {
 
     /// Takes notice of whether the deployment is led down.
     pub(super) fn heed_leaving(&mut self) {
+        // Of the deployment, and of subsystems by themselves.
         let leaving = self.counts.leaving.load(Ordering::Acquire);
         if leaving != self.leaving.is_some() {
             self.leaves(leaving);
+        }
+        let changes = self.counts.leaving_changes.load(Ordering::Acquire);
+        if changes != self.leaving_inside.0 {
+            let all = self.counts.leaving_inside.lock().unwrap_or_else(PoisonError::into_inner);
+            self.leaving_inside = (changes, all.iter().copied().collect());
         }
     }
 

@@ -238,7 +238,14 @@ impl DeploymentReader<'_> {
             for (inner, outer, _) in draft.activities {
                 activities.insert(inner, outer);
             }
-            read.push(Subsystem { name: draft.name, own, activities, holds: Default::default(), file: draft.file, origin: draft.origin });
+            read.push(Subsystem {
+                name: draft.name,
+                own,
+                activities,
+                holds: Default::default(),
+                file: draft.file,
+                origin: draft.origin,
+            });
         }
         (read.len() == wanted).then_some(read)
     }

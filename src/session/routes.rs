@@ -209,10 +209,11 @@ impl Listener for ToConfigurator {
     fn delivers(&mut self, event: EventName) {
         let Some(junction) = self.junction.upgrade() else { return };
         self.begins = junction.begins(event);
-        if let Some(subsystems) = junction.subsystems() {
-            subsystems.takes_up(self.name, event);
-        }
+        let led = junction.subsystems().and_then(|subsystems| subsystems.takes_up(self.name, event));
         if let Some(configurator) = self.configurator() {
+            if let Some((path, ends)) = led {
+                configurator.leaving_inside(path, ends);
+            }
             // It may wait behind the one that begins it.
             junction.tell_leaving(&configurator, event);
         }

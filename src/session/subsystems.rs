@@ -204,10 +204,10 @@ impl Subsystems {
         }
     }
 
-    /// A coordinator takes an event up: it may be the one that begins or ends its subsystem.
-    pub fn takes_up(&self, by: Requester, event: EventName) {
-        let Some(path) = self.of.get(&by) else { return };
-        let Some(at) = self.all.iter().position(|known| known.path == *path) else { return };
+    /// A coordinator takes an event up: it may be the one that begins or ends its subsystem. Answers which, and whether it ends it.
+    pub fn takes_up(&self, by: Requester, event: EventName) -> Option<(Ident, bool)> {
+        let path = self.of.get(&by)?;
+        let at = self.all.iter().position(|known| known.path == *path)?;
         let known = &self.all[at];
         let now = self.clock.now();
         let mut lives = lock(&self.lives);
@@ -217,10 +217,11 @@ impl Subsystems {
         } else if event == known.ends {
             (lives[at].down_until, lives[at].up_until) = (Some(now + known.down_within), None);
         } else {
-            return;
+            return None;
         }
         drop(lives);
         self.wake.notify();
+        Some((*path, event == known.ends))
     }
 
     /// All coordinators of a subsystem are down, and nothing is left of it.

@@ -7,7 +7,7 @@
 
 use super::leave::along;
 use super::work::{Op, Planned, Room, Work};
-use super::{FrameId, Reason, Request, Requester, Residual, Why, World, claims, may_commit, share};
+use super::{FrameId, LedDown, Reason, Request, Requester, Residual, Why, World, claims, may_commit, share};
 
 use crate::model::{Ask, ComponentName, ConfigId, Configuration, Finding, OnFailure, Step, Verdict, codes};
 use crate::plan::replace::neighbours;
@@ -37,8 +37,8 @@ pub struct Rules<'a> {
     pub joined: bool,
     /// Its pushes have taken their place on the stack when they began: what others hold on to since does not matter.
     pub placed: bool,
-    /// It has begun alone, while everything is led down: what operators have put in the way of its undos goes with these.
-    pub alone: bool,
+    /// It has begun alone, while this is led down: what operators have put in the way of its undos goes with these.
+    pub alone: Option<LedDown>,
 }
 
 /// A request of a batch that is answered.
@@ -162,10 +162,13 @@ fn add(
     repaired: bool,
 ) -> Result<(), Refusal> {
     match op {
-        Op::Undo(id) if rules.alone => {
-            let with = along(world, &work.frames, request, *id, repaired).map_err(|found| Refusal::one(*found))?;
-            work.add_undo(*id, &with)
-        }
+        Op::Undo(id) => match rules.alone.filter(|led| led.is_led_by(request.requester)) {
+            Some(led) => {
+                let with = along(world, &work.frames, request, *id, (led, repaired));
+                work.add_undo(*id, &with.map_err(|found| Refusal::one(*found))?)
+            }
+            None => work.add(op, context),
+        },
         op => work.add(op, context),
     }
 }

@@ -2,7 +2,7 @@
 //! same time (semantics: *Requests*).
 
 use super::contenders::{contenders, may_hold};
-use super::request::Request;
+use super::request::{LedDown, Request};
 use crate::model::names::is_within;
 use crate::model::{Ask, Catalogue, ChangeKind, ComponentName, ConfigId, Configuration, Ident, Target};
 use rustc_hash::FxHashMap;
@@ -107,8 +107,10 @@ impl Claims {
             }
         }
         let contenders = contenders(&may_hold(configurations.clone(), types));
-        let rivals: Vec<(usize, Vec<usize>)> =
-            contenders.iter().map(|(name, all)| (numbers[name], all.iter().map(|rival| numbers[rival]).collect())).collect();
+        let rivals: Vec<(usize, Vec<usize>)> = contenders
+            .iter()
+            .map(|(name, all)| (numbers[name], all.iter().map(|rival| numbers[rival]).collect()))
+            .collect();
         for claim in of.values_mut() {
             let mut more = Claim::default();
             let claimed = rivals.iter().filter(|(at, _)| claim.has(*at));
@@ -162,6 +164,15 @@ impl Claims {
             names.for_each(|(_, at)| inside.set(*at));
             inside.meets(&self.of(requests))
         }
+    }
+
+    /// What is led down.
+    pub fn of_led(&self, led: LedDown) -> Claim {
+        let LedDown::Inside(path) = led else { return Claim::all() };
+        let mut inside = Claim::default();
+        let names = self.numbers.iter().filter(|(name, _)| is_within(name.prefix(), path.as_str()));
+        names.for_each(|(_, at)| inside.set(*at));
+        inside
     }
 
     /// What requests claim together. A configuration that is not there claims nothing.

@@ -4,8 +4,8 @@
 //! the same coordinator, or of the same connection of an operator, is over. Then it has all of that until its last request is answered. So no cycle of waits can
 //! arise, and none starves.
 
-use super::claims::{Claim, Claims, is_of_system};
-use super::request::{Batch, Request, Requester, Why};
+use super::claims::{Claims, is_of_system};
+use super::request::{Batch, LedDown, Request, Requester, Why};
 use super::{Reason, answer};
 use crate::model::{Ask, ConfigId, Verdict};
 use smallvec::SmallVec;
@@ -20,10 +20,11 @@ pub struct ActiveBatch {
     pub batch: Batch,
     /// Undos that have given up requests of it, in the order in which they came.
     pub given_up: Vec<GivenUp>,
-    /// It has everything until it is over: what its undos take along is not known from its text ([`Stack::goes_alone`]).
+    /// It has all that is led down until it is over: what its undos take along is not known from its text
+    /// ([`Stack::goes_alone`]).
     ///
     /// [`Stack::goes_alone`]: super::Stack::goes_alone
-    pub alone: bool,
+    pub alone: Option<LedDown>,
 }
 
 /// An undo that has given up a request of a batch under way.
@@ -192,7 +193,7 @@ impl Desk {
     pub fn begin_next(
         &mut self,
         claims: &Claims,
-        alone: impl Fn(&Batch) -> bool,
+        alone: impl Fn(&Batch) -> Option<LedDown>,
         safe: &[ConfigId],
     ) -> Option<&ActiveBatch> {
         let at = if self.under_way.is_empty() && safe.is_empty() {
@@ -208,14 +209,17 @@ impl Desk {
         self.under_way.last()
     }
 
-    fn free(&self, claims: &Claims, alone: impl Fn(&Batch) -> bool, safe: &[ConfigId]) -> Option<usize> {
+    fn free(&self, claims: &Claims, alone: impl Fn(&Batch) -> Option<LedDown>, safe: &[ConfigId]) -> Option<usize> {
         let mut held = claims.of(self.under_way.iter().flat_map(|active| &active.batch.requests));
-        if self.under_way.iter().any(|active| active.alone) {
-            held.join(&Claim::all());
+        for led in self.under_way.iter().filter_map(|active| active.alone) {
+            held.join(&claims.of_led(led));
         }
         let mut asking: Vec<Line> = self.under_way.iter().filter_map(|active| line(&active.batch)).collect();
         for (at, batch) in self.waiting.iter().enumerate() {
-            let claim = if alone(batch) { Claim::all() } else { claims.of(&batch.requests) };
+            let mut claim = claims.of(&batch.requests);
+            if let Some(led) = alone(batch) {
+                claim.join(&claims.of_led(led));
+            }
             let waits = || safe.iter().any(|safe| claims.interrupts(*safe, &batch.requests));
             if !claim.meets(&held) && line(batch).is_none_or(|by| !asking.contains(&by)) && !waits() {
                 return Some(at);

@@ -4,10 +4,11 @@
 //! there who would take that away again. So it goes first, newest first, in one transaction with the undo that was asked for:
 //! both or none. What is `safe`, and what would move, is nobody's to take along.
 
-use super::request::{Batch, Request, Requester, Why};
+use super::request::{Batch, LedDown, Request, Requester, Why};
 use super::share::{self, Hindrance};
 use super::{Frame, FrameId, Inverse, Stack, World};
-use crate::model::Finding;
+use crate::model::names::is_within;
+use crate::model::{ComponentName, Finding};
 use crate::plan::PlannedStep;
 use crate::plan::undo::DraftStep;
 use crate::system::touch::{Slot, slot};
@@ -21,16 +22,23 @@ fn takes_along(request: &Request) -> bool {
     request.why == Why::Asked && request.ask.is_undo() && matches!(request.requester, Requester::Coordinator(_))
 }
 
+/// What a frame is about that is outside of what is led down.
+fn outside(led: LedDown, frame: &Frame) -> Option<ComponentName> {
+    let LedDown::Inside(path) = led else { return None };
+    share::components(&frame.footprint).into_iter().filter(|one| !is_within(one.prefix(), path.as_str())).min()
+}
+
 impl Stack {
-    /// Whether a batch may come to undo frames that its text does not name, while everything is led down: then it goes alone.
-    pub fn goes_alone(&self, batch: &Batch) -> bool {
-        let theirs = |frame: &Arc<Frame>| frame.requester == Requester::Operator;
-        batch.requests.iter().any(takes_along) && self.frames.iter().any(theirs)
+    /// Whether a batch may come to undo frames that its text does not name, while this is led down: then it has all of it.
+    pub fn goes_alone(&self, batch: &Batch, led: LedDown) -> bool {
+        let theirs = |frame: &Arc<Frame>| frame.requester == Requester::Operator && outside(led, frame).is_none();
+        let own = |request: &Request| takes_along(request) && led.is_led_by(request.requester);
+        batch.requests.iter().any(own) && self.frames.iter().any(theirs)
     }
 }
 
 /// The frames that the undo of `id`, asked for by `request`, takes along, in the order in which they go; none where it needs
-/// none. `frames` are those that there are then. `repaired`: what is broken is mended before.
+/// none. `frames` are those that there are then, `led` is what is led down. `repaired`: what is broken is mended before.
 ///
 /// # Errors
 /// What stands in its way and stays, in words: of a frame of an operator also why it does.
@@ -39,7 +47,7 @@ pub(super) fn along(
     frames: &[Arc<Frame>],
     request: &Request,
     id: FrameId,
-    repaired: bool,
+    (led, repaired): (LedDown, bool),
 ) -> Result<SmallVec<[FrameId; 2]>, Box<Finding>> {
     let mut along: SmallVec<[FrameId; 2]> = SmallVec::new();
     if !takes_along(request) {
@@ -55,7 +63,7 @@ pub(super) fn along(
         let Err(hindrance) = share::look(&rest, at) else { continue };
         let Hindrance { by, finding } = *hindrance;
         let frame = rest.iter().find(|frame| Some(frame.id) == by);
-        let why = match frame.map(|frame| stays(world, frame, &rest, repaired)) {
+        let why = match frame.map(|frame| stays(world, frame, &rest, (led, repaired))) {
             Some(None) => None,
             Some(Some(why)) => Some(why),
             None => Some(None),
@@ -78,9 +86,17 @@ pub(super) fn along(
 }
 
 /// Whether a frame is not taken along from among these, and why, where it could be thought to be.
-fn stays(world: &World, frame: &Frame, frames: &[Arc<Frame>], repaired: bool) -> Option<Option<String>> {
+fn stays(
+    world: &World,
+    frame: &Frame,
+    frames: &[Arc<Frame>],
+    (led, repaired): (LedDown, bool),
+) -> Option<Option<String>> {
     if frame.requester != Requester::Operator {
         return Some(None);
+    }
+    if let Some(component) = outside(led, frame) {
+        return Some(Some(format!("it is about `{component}` as well, which goes on")));
     }
     if frame.safe {
         return Some(Some("it is a safe configuration, and people let it go".to_owned()));

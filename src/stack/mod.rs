@@ -37,7 +37,7 @@ pub use effort::{BestEffort, effort};
 pub use net::reduce;
 pub use permanent::may_commit;
 pub use prepared::{ResolvedStep, Switch};
-pub use request::{Batch, FrameId, Request, Requester, Scope, Why};
+pub use request::{Batch, FrameId, LedDown, Request, Requester, Scope, Why};
 pub use settle::{About, Ending, Endings, SafeEnd, Settled, Stopped, settle};
 pub use share::{HandOver, calls, components, is_kept, shares, staying};
 pub use stands::{is_stood_down, running_for};

@@ -7,7 +7,7 @@
 
 use super::share::components;
 use super::{Frame, FrameId, Inverse, Planned, Requester, Scope, Stack};
-use crate::model::{ComponentName, Configuration, RunState, Step, Target, Value};
+use crate::model::{ComponentName, Configuration, RunState, Step, Target, Transition, Value};
 use crate::plan::footprint::{Saved, Slot};
 use crate::plan::undo::absolute;
 use crate::plan::{PlannedStep, SavedValue};
@@ -52,6 +52,12 @@ pub struct ResolvedStep<'s> {
     pub value: Option<&'s Value>,
 }
 
+/// Whether a step takes or gives back what a component holds for itself: who else needs that is another matter each time.
+fn holds(step: &Step, system: &System) -> bool {
+    let Step::State { component, transition: Transition::Configure | Transition::Cleanup } = step else { return false };
+    system.component(*component).is_some_and(|node| !node.ty.exclusive.is_empty())
+}
+
 impl Switch {
     /// Keeps what was planned on `system` for `configuration` alone. None: it is no fixed switch (it creates, destroys,
     /// connects, disconnects, calls operations, uses `_default`, has to wait for what it stands for), it moves hardware, or
@@ -65,6 +71,7 @@ impl Switch {
             || configuration.holds.is_some()
             || lists.any(|entry| entry.target == Target::Default)
             || !frame.steps().iter().all(is_fixed)
+            || frame.steps().iter().any(|planned| holds(&planned.step, system))
         {
             return None;
         }

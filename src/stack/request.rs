@@ -1,6 +1,7 @@
 //! What is asked of a configurator: requests, who makes them, and which belong together (semantics: *Requests*).
 
-use crate::model::{Ask, ComponentName, OPERATOR, RequestId};
+use crate::model::names::is_within;
+use crate::model::{Ask, ComponentName, ConfigId, Ident, OPERATOR, RequestId};
 use smallvec::SmallVec;
 use std::fmt;
 use std::hash::{Hash, Hasher};
@@ -137,5 +138,33 @@ impl Batch {
 impl FromIterator<Request> for Batch {
     fn from_iter<I: IntoIterator<Item = Request>>(requests: I) -> Self {
         Self { requests: requests.into_iter().collect() }
+    }
+}
+
+/// What is led down.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum LedDown {
+    /// The deployment.
+    Whole,
+    /// The subsystem of this path, by the event that ends it.
+    Inside(Ident),
+}
+
+impl LedDown {
+    /// Whether a coordinator is one of those that lead it down.
+    pub fn is_led_by(self, requester: Requester) -> bool {
+        match (self, requester) {
+            (Self::Whole, _) => true,
+            (Self::Inside(path), Requester::Coordinator(name)) => is_within(name.as_str(), path.as_str()),
+            (Self::Inside(_), Requester::Operator | Requester::Safety) => false,
+        }
+    }
+
+    /// Whether a configuration belongs to it.
+    pub fn has(self, id: ConfigId) -> bool {
+        match self {
+            Self::Whole => true,
+            Self::Inside(path) => is_within(id.prefix(), path.as_str()),
+        }
     }
 }

@@ -367,7 +367,7 @@ fn an_undo_by_leaving_a_state_that_is_refused_leaves_a_frame_like_others() {
         operator: &rustc_hash::FxHashSet::default(),
         joined: false,
         placed: false,
-        alone: false,
+        alone: None,
     };
     let ask = Ask::UndoOf(ConfigId::new("low").unwrap());
     let undo = super::Request { scope, ..super::Request::new(RequestId(1), ask, Requester::Operator) };
@@ -400,7 +400,7 @@ fn an_undo_by_leaving_a_state_is_about_the_visit_that_was_left() {
         operator: &rustc_hash::FxHashSet::default(),
         joined: false,
         placed: false,
-        alone: false,
+        alone: None,
     };
     let ask = Ask::UndoOf(ConfigId::new("mass").unwrap());
     let undo = super::Request { scope, ..super::Request::new(RequestId(1), ask, Requester::Operator) };
@@ -427,7 +427,7 @@ fn what_has_given_up_a_request_goes_with_its_answer() {
     let under_way = || {
         let mut desk = super::Desk::default();
         let _ = desk.arrive((0..3).map(apply).collect(), |_| false, &claims);
-        let number = desk.begin_next(&claims, |_| false, &[]).expect("nothing is in its way").number;
+        let number = desk.begin_next(&claims, |_| None, &[]).expect("nothing is in its way").number;
         assert_eq!([1, 2, 1].map(|n| desk.give_up(number, undo(n))), [Some(1), Some(2), Some(1)]);
         (desk, number)
     };
@@ -476,10 +476,14 @@ fn what_stands_in_the_way_goes_along_where_a_safe_configuration_keeps_what_would
         let world = super::World::new(bench.system.clone(), bench.stack.clone());
         let frames = bench.stack.frames();
         let undo = super::Request::new(RequestId(1), Ask::UndoOf(lower.id), coordinator);
-        let along = super::leave::along(&world, frames, &undo, frames[0].id, false);
+        let along = super::leave::along(&world, frames, &undo, frames[0].id, (super::LedDown::Whole, false));
         match safe {
             true => assert_eq!(along.unwrap()[..], [frames[2].id]),
             false => assert!(along.unwrap_err().message.contains("`operation_call A.close()` moves")),
         }
+        // Where a subsystem is led down by itself, what is about something else as well stays.
+        let inside = super::LedDown::Inside(Ident::new("arm").unwrap());
+        let stays = super::leave::along(&world, frames, &undo, frames[0].id, (inside, false)).unwrap_err();
+        assert!(stays.message.ends_with("it is about `A` as well, which goes on"), "{}", stays.message);
     }
 }

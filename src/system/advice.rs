@@ -3,7 +3,9 @@
 use super::violation::MemberClass;
 use super::{View, Violation};
 use crate::model::finding::did_you_mean;
-use crate::model::{ComponentName, ComponentType, Finding, Ident, MemberRef, Origin, Resource, Tunable, TypeName, ValueType};
+use crate::model::{
+    ComponentName, ComponentType, Finding, Ident, MemberRef, Origin, Resource, Tunable, TypeName, ValueType,
+};
 
 impl Violation {
     /// It as a finding, at no place yet: what is wrong, where what it is about was declared, what to do. `view` is the

@@ -115,7 +115,7 @@ const MID_COORDINATOR: &str = "return state {
   trans { src = 'lowering', tgt = 'idle', events = { 'inner/down' } },
 }";
 /// Two coordinators for a pair: one begins and ends, the other touches.
-const LEAD: &str = "return state {
+pub const LEAD: &str = "return state {
   idle = state {}, raising = state { entry = { 'left/e_start', 'right/e_start' } }, on = state {},
   lowering = state { entry = { 'left/e_shutdown', 'right/e_shutdown', 'left/e_released', 'right/e_released' } },
   trans { src = 'initial', tgt = 'idle' },
@@ -125,7 +125,7 @@ const LEAD: &str = "return state {
   trans { src = 'on', tgt = 'lowering', events = { 'e_shutdown' } },
   trans { src = 'lowering', tgt = 'idle', events = { 'left/down' } },
 }";
-const LINK: &str = "return state {
+pub const LINK: &str = "return state {
   idle = state {}, waiting = state {}, joining = state { entry = 'stiff' }, joined = state {}, parting = state { entry = 'stiff.undo' },
   trans { src = 'initial', tgt = 'idle' },
   trans { src = 'idle', tgt = 'waiting', events = { 'e_start' } },

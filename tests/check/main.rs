@@ -15,6 +15,7 @@ mod beside;
 mod circles;
 mod composed;
 mod demands;
+mod exclusive;
 mod flat_plans;
 mod follow;
 mod product;

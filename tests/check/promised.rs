@@ -180,3 +180,30 @@ fn to_let_go_with_the_end_is_too_early_where_the_subsystem_waits_later() {
     let says = early(&[stops_first, halts]);
     assert!(says.len() == 2 && says[0].contains("does not wait for it at once after `e_shutdown`"), "{says:?}");
 }
+
+#[test]
+fn to_let_go_what_has_not_asked_for_it_is_too_early() {
+    let early = |changes: &[Change]| of(changes, "compose::unleft", Severity::Warning);
+    let unasked = ("pair.lua", "coupled = state {},", "coupled = state { entry = 'left/e_released' },");
+    let says = early(&[unasked]);
+    assert!(
+        says.len() == 1 && says[0].contains("has not said `left/e_leaving`, and `left/e_shutdown` was not"),
+        "{says:?}"
+    );
+    // When it was heard that it wants to leave it is not.
+    let asked = [
+        (
+            "pair.lua",
+            "lone = state {},",
+            "lone = state {}, asked = state { entry = { 'left/e_released', 'couple.undo' } },",
+        ),
+        (
+            "pair.lua",
+            "events = { 'e_shutdown', 'left/e_leaving', 'right/e_leaving', 'couple.failed', 'couple.broken' } },",
+            "events = { 'e_shutdown', 'right/e_leaving', 'couple.failed', 'couple.broken' } },
+  trans { src = 'alive', tgt = 'asked', events = { 'left/e_leaving' } },
+  trans { src = 'asked', tgt = 'lowering', events = { 'couple.undone', 'couple.undo.failed', 'couple.undo.broken' } },",
+        ),
+    ];
+    assert!(early(&asked).is_empty(), "{:?}", early(&asked));
+}

@@ -438,3 +438,22 @@ fn pictures_have_boxes_arrows_and_folds() {
     ]);
     assert!(live.code == 0 && live.out.contains("class n2,n6 active"), "{}{}", live.out, live.err);
 }
+
+/// A subsystem that its parent leads down by itself takes along what an operator put in its way there, as a deployment does that is led
+/// down whole; and while it is led down an operator asks for nothing more of it.
+#[test]
+fn what_an_operator_put_on_a_subsystem_goes_when_that_is_led_down_alone() {
+    let demo = cell();
+    demo.write(
+        "story.lua",
+        "deploy('pair.yaml')
+         set('left/Drive.gain', 1.5, { force = true, within = 1 })
+         set('right/Drive.gain', 1.5, { force = true, within = 1 })
+         raise('left/e_shutdown')
+         wait_answer('left/make.undone', 5)
+         wait_state('pair:idle', 5)
+         shutdown()",
+    );
+    let ran = demo.run(&["run", "story.lua", "--clock", "simulated"]);
+    assert_eq!(ran.code, 0, "{}{}", ran.out, ran.err);
+}

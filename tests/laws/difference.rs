@@ -4,7 +4,7 @@ use crate::generate;
 use crate::plain::Plain;
 use crate::settings;
 use davit::model::RunState;
-use davit::system::{System, diff};
+use davit::system::{System, View, diff, exclusive};
 use proptest::prelude::*;
 
 /// `b` as far as it can be reached from `a`: nothing brings about a fault.
@@ -37,7 +37,11 @@ proptest! {
             let genes: Vec<_> = common.iter().chain(more).cloned().collect();
             let mut system = generate::grow(catalogue.clone(), &genes).0;
             if fault % 2 == 1 {
-                system.set_state(generate::name(fault / 2), RunState::Faulted);
+                let name = generate::name(fault / 2);
+                // What another one holds it cannot have taken by failing.
+                if system.component(name).is_some_and(|node| exclusive::taken(node, &system).is_none()) {
+                    system.set_state(name, RunState::Faulted);
+                }
             }
             // Written values, also under connections: written before they were made.
             let mut now = system.snapshot();

@@ -29,6 +29,20 @@ impl Plain {
         self.of(port.component)?.1.ports.get(&port.member)
     }
 
+    /// What a component needs for itself.
+    fn needs(&self, component: ComponentName) -> Vec<String> {
+        let Some((it, ty)) = self.of(component) else { return Vec::new() };
+        let name = |thing: &Resource| {
+            let mut name = thing.to_string();
+            for (property, value) in &it.properties {
+                let value = if let Value::Str(text) = value { text.to_string() } else { value.to_string() };
+                name = name.replace(&format!("{{{property}}}"), &value);
+            }
+            name
+        };
+        ty.exclusive.iter().map(name).collect()
+    }
+
     /// Whether a step may happen.
     pub fn allows(&self, step: &Step) -> bool {
         self.judge(step).is_some_and(|yes| yes)
@@ -37,13 +51,21 @@ impl Plain {
     fn judge(&self, step: &Step) -> Option<bool> {
         use RunState::{Faulted, Running, Stopped, Unconfigured};
         Some(match step {
-            Step::State { component, transition } => matches!(
-                (self.is.components.get(component)?.state, transition),
-                (Unconfigured, Transition::Configure)
-                    | (Stopped, Transition::Start)
-                    | (Running, Transition::Stop)
-                    | (Stopped | Faulted, Transition::Cleanup)
-            ),
+            Step::State { component, transition } => match (self.is.components.get(component)?.state, transition) {
+                (Unconfigured, Transition::Configure) => {
+                    let needs = self.needs(*component);
+                    let holds = |(name, it): (&ComponentName, &ComponentSnapshot)| {
+                        name != component
+                            && it.state != Unconfigured
+                            && self.needs(*name).iter().any(|thing| needs.contains(thing))
+                    };
+                    !self.is.components.iter().any(holds)
+                }
+                (Stopped, Transition::Start)
+                | (Running, Transition::Stop)
+                | (Stopped | Faulted, Transition::Cleanup) => true,
+                _ => false,
+            },
             Step::Create { component, ty, properties, .. } => {
                 let ty = self.ty(*ty)?;
                 !self.is.components.contains_key(component)

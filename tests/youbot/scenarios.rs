@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Each with what is set for it here: what takes a minute in the file is shorter.
-const SCENARIOS: [(&str, &[(&str, &str)]); 13] = [
+const SCENARIOS: [(&str, &[(&str, &str)]); 14] = [
     ("bring_up", &[]),
     ("crash", &[]),
     ("driver", &[]),
@@ -22,6 +22,7 @@ const SCENARIOS: [(&str, &[(&str, &str)]); 13] = [
     ("push", &[]),
     ("shutdown_while_copying", &[]),
     ("tracking", &[("seconds", "20")]),
+    ("udp", &[]),
 ];
 
 fn folder() -> PathBuf {
@@ -124,4 +125,9 @@ fn shutdown_while_copying() {
 #[test]
 fn tracking() {
     run("tracking");
+}
+
+#[test]
+fn udp() {
+    run("udp");
 }

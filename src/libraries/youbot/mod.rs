@@ -2,6 +2,7 @@
 
 pub mod base;
 pub mod components;
+pub mod datagram;
 pub mod drives;
 pub mod dynamics;
 pub mod hand;

@@ -12,6 +12,7 @@ mod passivity;
 mod peer;
 mod reporter;
 pub mod samples;
+mod udp;
 mod world;
 
 pub use base_ctrl::BaseCtrl;
@@ -25,6 +26,7 @@ pub use operator::{ModeSwitch, Operator};
 pub use passivity::CouplingObserver;
 pub use peer::Peer;
 pub use reporter::Reporter;
+pub use udp::Udp;
 pub use world::YoubotWorld;
 
 use crate::runtime::{Context, In, Library, PortValue};
@@ -42,6 +44,7 @@ pub fn library() -> Library {
         .with::<LinkTx>("youbot.Link_Tx")
         .with::<LinkRx>("youbot.Link_Rx")
         .with::<Net>("youbot.Net")
+        .with::<Udp>("youbot.Udp")
         .with::<Peer>("youbot.Peer")
         .with::<CouplingObserver>("youbot.Passivity_Observer")
         .with::<Operator>("youbot.Operator")
