@@ -38,6 +38,7 @@ pub const FOLLOWED: &[Code] = &[
     DATA_ALONE,
     NOT_TUNABLE,
     PORT_DRIVEN,
+    RESOURCE_HELD,
     PORT_UNMAPPED,
     // The same, where a component is of one of several types then.
     UNKNOWN_PORT,
@@ -61,7 +62,15 @@ pub const FOLLOWED: &[Code] = &[
 pub const READ: &[(&str, &[Code])] = &[
     (
         "it is about one file of several, and what comes from the others there is brought about by no script",
-        &[COMPOSE_PROMISE, COMPOSE_UNLEFT, COMPOSE_UNKNOWN, COMPOSE_SAFETY, COMPOSE_WORD, COMPOSE_EXPORT_DRIVEN],
+        &[
+            COMPOSE_PROMISE,
+            COMPOSE_UNLEFT,
+            COMPOSE_UNKNOWN,
+            COMPOSE_SAFETY,
+            COMPOSE_WORD,
+            COMPOSE_EXPORT_DRIVEN,
+            COMPOSE_EXCLUSIVE,
+        ],
     ),
     (
         "it is told of what the deployment says, wherever that is used: no way leads to it",
@@ -72,6 +81,7 @@ pub const READ: &[(&str, &[Code])] = &[
             MISSING_PROPERTY,
             TYPE_CIRCLE,
             TYPE_DIFFERS,
+            TYPE_EXCLUSIVE,
             TYPE_UNKNOWN_OPERATION,
             TYPE_UNKNOWN_TYPE,
             TYPE_WITHOUT_CODE,

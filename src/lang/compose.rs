@@ -2,7 +2,7 @@
 
 use super::tree::Cx;
 use crate::model::condition_walk::Looked;
-use crate::model::finding::did_you_mean;
+use crate::model::finding::{did_you_mean, nearest};
 use crate::model::monitor::Condition;
 use crate::model::subsystem::ExportKind;
 use crate::model::within::Within;
@@ -249,7 +249,14 @@ impl Resolve<'_> {
             None => {
                 let message = format!("`{}` exports nothing called `{}`", subsystem.name, member.member);
                 let known = exports.iter().filter(|(_, export)| export.kind == kind).map(|(name, _)| name.as_str());
-                let help = did_you_mean(member.member.as_str(), kind.key(), known);
+                let (name, key) = (member.member, kind.key());
+                let help = did_you_mean(name.as_str(), key, known.clone());
+                let help = match nearest(name.as_str(), known) {
+                    Some(_) => help,
+                    None => format!(
+                        "export it in its file (`exports: {{ {key}: {{ {name}: COMPONENT.{name} }} }}`); {help}"
+                    ),
+                };
                 let finding = Finding::error(codes::COMPOSE_NOT_EXPORTED, message).at(at).path(place);
                 cx.report(finding.also(subsystem.origin, "the subsystem").help(help));
                 member

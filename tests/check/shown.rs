@@ -77,6 +77,7 @@ fn odd(changes: &str, more: &str) -> Small {
       k: { type: float, default: 1.0, max: 10.0 }
     operations:
       go: { effect: none }
+  Single: { exclusive: [bus] }
 ",
     );
     small
@@ -97,6 +98,11 @@ fn reasons() -> Vec<Row> {
         reason("conf::data_alone", "connect('b.p', 'b.q')", "connect('a.p', 'b.q')|"),
         reason("conf::not_tunable", "property_set('a.mode', 1)", "post_conf_state = { 'a:running' }|"),
         reason("conf::port_driven", "port_write('b.q', 1.0)", "connect('a.p', 'b.q')|"),
+        reason(
+            "conf::resource_held",
+            "create('s', 'Single'), create('t', 'Single'), post_conf_state = { 's:stopped', 't:stopped' }",
+            "",
+        ),
         reason("conf::port_unmapped", "replace('a', 'Two')", "connect('a.m', 'b.q')|"),
         reason("conf::port_unlike", "replace('x', 'One', { map = { ty = 'q' } })", ""),
         reason("conf::clash", "property_set('a.k', 2.0), property_set('a.k', 3.0)", ""),
