@@ -53,6 +53,8 @@ pub struct Driver {
     drives: Drives,
     faults: i64,
     task: Option<Ticket>,
+    /// For how long they have been taking torques, in s.
+    taking: f64,
     outside: bool,
     unheard: Option<f64>,
     unwatched: Option<f64>,
@@ -165,6 +167,7 @@ impl Component for Driver {
             drives: Drives::default(),
             faults: 0,
             task: None,
+            taking: 0.0,
             outside: false,
             unheard: None,
             unwatched: None,
@@ -190,7 +193,9 @@ impl Component for Driver {
         let effort = aged(&mut self.effort, cx).filter(|(_, age)| fresh(*age));
         let rail = aged(&mut self.rail, cx).filter(|(_, age)| fresh(*age));
         let command = effort.zip(rail).map(|((effort, _), (rail, _))| Commanded { effort: effort.into(), rail });
-        if self.drives.mode() == Mode::Torques && command.is_none() {
+        // Who has just begun to command them has a moment to be heard in; until then they hold.
+        self.taking = if self.drives.mode() == Mode::Torques { self.taking + dt } else { 0.0 };
+        if self.taking > COMMAND_TIMEOUT && command.is_none() {
             self.drives.hold();
             self.events.raise(self.names.command_watchdog);
         }

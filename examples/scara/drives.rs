@@ -297,6 +297,12 @@ impl Drives {
                     self.target_speed[i] += step;
                 }
                 self.target += self.target_speed * dt;
+                if self.mode == Mode::Torques {
+                    // The arm is not the drives': what it does is not wanted of the rail.
+                    for i in RAIL + 1..AXES {
+                        (self.target[i], self.target_speed[i], self.target_gain[i]) = (self.q[i], self.v[i], 0.0);
+                    }
+                }
                 None
             }
             Task::Moving { from, to, ref mut since, takes } => {
