@@ -140,8 +140,8 @@ pub struct Torques {
 impl Component for Torques {
     fn new(b: &mut Builder<Self>) -> Self {
         b.describe(
-            "Forces and torques of the arm for a wrench on its tool, with its weight, its Coriolis forces and most of its friction taken off; \
-             and the speed of a carriage that gives way. Without a wrench the arm floats.",
+            "Forces and torques of the arm for a wrench on its tool, with its weight, its Coriolis forces and, while it is coupled, most of its \
+             friction taken off; and the speed of a carriage that gives way. Without a wrench the arm floats and comes to rest.",
         )
         .start_after("scara.Follower")
         .on_start(|c, _| {
@@ -171,7 +171,7 @@ impl Component for Torques {
                 .unit("1/s")
                 .range(0.0..=10.0)
                 .property("recenter", 4.0),
-            friction_comp: b.doc("Share of Coulomb's friction taken off.").range(0.0..=1.0).property("friction_comp", 0.9),
+            friction_comp: b.doc("Share of Coulomb's friction taken off while it is coupled.").range(0.0..=1.0).property("friction_comp", 0.9),
             enabled: b.doc("Whether the carriage may move at all.").property("enabled", true),
             arm: Arm { payload: BELIEVED_PAYLOAD },
             speed: 0.0,
@@ -196,7 +196,8 @@ impl Component for Torques {
 
         let pulled = jacobian(&q).tr_mul(&wrench);
         let mut effort = pulled + self.arm.bias(&q, &v);
-        let share = self.friction_comp.get();
+        // Let go of, an arm comes to rest by its own friction: help against it would let it coast.
+        let share = self.friction_comp.get() * engaged;
         for i in 0..AXES {
             let way = v[i] + pulled[i] / (SETS_OUT * COULOMB[i]);
             effort[i] += share * COULOMB[i] * (way / STILL).tanh();

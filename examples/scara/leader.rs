@@ -113,6 +113,8 @@ pub struct Leader {
     coupled: bool,
     near: f64,
     since: f64,
+    /// How far off what it tells is, and for how much longer, in s.
+    jump: (V4, f64),
 }
 
 impl Component for Leader {
@@ -122,13 +124,21 @@ impl Component for Leader {
              hand brings it to where the arm's tool is; coupled it goes along its path, and feels the arm by a spring as that feels it.",
         )
         .on_configure(|c, _| {
-            #[allow(clippy::cast_sign_loss)]
-            let seed = c.seed.get() as u64;
-            *c.ways = [Way::new(seed), Way::new(seed ^ 0x5555_5555)];
+            c.draw_anew();
+            c.jump = (V4::zeros(), 0.0);
             (c.p, c.v, c.wants) = (c.start.get().into(), V4::zeros(), c.start.get().into());
             (c.other, c.coupling, c.coupled, c.near, c.since) = (None, Coupling::default(), false, 0.0, PACKETS);
             Ok(())
         });
+        b.doc("What it tells is off by so much, in m, for so many seconds: a sensor that jumps.")
+            .parameter("x", Some(0.0))
+            .parameter("y", Some(0.0))
+            .parameter("z", Some(0.0))
+            .parameter("seconds", None::<f64>)
+            .injection("jump", |c, _, (x, y, z, seconds): (f64, f64, f64, f64)| {
+                c.jump = (V4::new(x, y, z, 0.0), seconds);
+                Ok(())
+            });
         Self {
             heard: b.doc("What the arm's end tells.").required().input("heard"),
             told: b.doc("What it tells the arm's end, when that arrives there.").output("told"),
@@ -150,7 +160,7 @@ impl Component for Leader {
                 .unit("m")
                 .range(-1.0..=1.0)
                 .property("go", [0.0; 3]),
-            seed: b.doc("Decides what is lost and late.").tunable(Tunable::Unconfigured).property("seed", 1),
+            seed: b.doc("Decides what is lost and late, from now on.").property("seed", 1),
             delay: b.doc("One way.").unit("s").range(0.0..=0.3).property("delay", 0.005),
             jitter: b.doc("Up to so much more.").unit("s").range(0.0..=0.1).property("jitter", 0.0),
             loss: b.doc("Share of the packets that is lost.").range(0.0..=1.0).property("loss", 0.0),
@@ -170,6 +180,7 @@ impl Component for Leader {
             coupled: false,
             near: 0.0,
             since: 0.0,
+            jump: (V4::zeros(), 0.0),
         }
     }
 
@@ -181,6 +192,10 @@ impl Component for Leader {
             loss: self.loss.get(),
             cut: self.cut.get(),
         };
+        if self.seed.changed() {
+            self.draw_anew();
+        }
+        self.jump.1 -= dt;
         self.since += dt;
         let sends = self.since >= PACKETS - 0.5 * dt;
         if sends {
@@ -214,8 +229,9 @@ impl Component for Leader {
         let near = other.is_some() && pull.wanted < ALIGNED.0;
         self.near = if near { self.near + dt } else { 0.0 };
         if sends {
+            let off = if self.jump.1 > 0.0 { self.jump.0 } else { V4::zeros() };
             let told = Told {
-                p: self.p.into(),
+                p: (self.p + off).into(),
                 v: self.v.into(),
                 stamp: i64::try_from(cx.now().0).unwrap_or(i64::MAX),
                 aligned: self.near >= ALIGNED.1,
@@ -233,6 +249,13 @@ impl Component for Leader {
 }
 
 impl Leader {
+    /// The network from the beginning.
+    fn draw_anew(&mut self) {
+        #[allow(clippy::cast_sign_loss)]
+        let seed = self.seed.get() as u64;
+        *self.ways = [Way::new(seed), Way::new(seed ^ 0x5555_5555)];
+    }
+
     /// What the hand does to the handle, `dt` seconds later.
     fn lead(&mut self, other: Option<Told>, dt: f64) -> V4 {
         let mut ahead = self.wants;

@@ -116,6 +116,7 @@ end
 deploy("deployment.yaml")
 figure{ name = "up after", value = now(), unit = "s" }
 change("Leader.delay", delay)
+change("Leader.seed", seed)
 wait_state("harmonizing", 2)
 wait_state("eight_DOF_mode", 10)
 expect{ name = "engaging: force in the first 0.3 s", value = (function()
@@ -145,6 +146,13 @@ assert(property("Torques.rail_gain") == 0)
 change("Leader.amplitude", EIGHT)
 wait(3)
 measure("the arm alone", seconds, { led = 100, stands = 1 })
+
+-- Packets lost and late.
+change("Leader.loss", 0.3)
+change("Leader.jitter", 0.01)
+measure("the arm alone, 30 % lost", seconds, { led = 100, stands = 1 })
+change("Leader.loss", 0)
+change("Leader.jitter", 0)
 
 -- Eight and five in turn: nothing is felt of it, and the last one counts.
 local s = record("in_turn", 0.001)
@@ -186,6 +194,30 @@ couple()
 wait_state("five_DOF_mode", 0)                  -- what was chosen is kept
 raise("e_8dof")
 wait(1)
+
+-- What the handle tells jumps: the arm is let go and the rail stands, until somebody says so.
+local s = record("jump", 0.001)
+wait(0.05)
+local at = now()
+inject("Leader", "jump", { x = 0.3, seconds = 0.2 })
+wait_answer("e_force_spike", 1)
+expect{ name = "the reference jumps: noticed after", value = 1000 * (now() - at), max = 20, unit = "ms" }
+wait_answer("base_stop.ok", 0.01)
+wait_state("soft_stop", 0)
+stays("the reference jumps", s, at)
+raise("e_reset")
+couple()
+
+-- Somebody shoves the tool: it gives way, and gets too fast. It brakes while the shove goes on.
+local s, at = record("push", 0.001), now() + 0.05
+inject("Plant", "push", { x = 20, y = 50, seconds = 0.1 }, at)
+wait_answer("e_overspeed", 1)
+local heard = now()
+expect{ name = "54 N for 0.1 s: noticed after", value = 1000 * (heard - at), max = 200, unit = "ms" }
+wait_answer("safe_hold.ok", 0.01)
+stays("54 N for 0.1 s", s, heard)
+raise("e_reset")
+couple()
 
 -- A motor takes too much current: heard, braked; after a reset it takes torques again before anything couples.
 local s, at = record("overcurrent", 0.001), now() + 0.05
