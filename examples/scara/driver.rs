@@ -93,14 +93,14 @@ impl Component for Driver {
                 None => OperationAnswer::failed(format!("no mode {mode}: 0, 1 or 2")),
             },
         );
-        b.doc("The quill to its upper stop, then the carriage to its end. Takes seconds.").no_effect().moves().operation(
-            "home",
-            |c, cx, (): ()| c.begin(cx, Drives::home),
-        );
-        b.doc("To the working pose, and holds there. Takes seconds.").undone_by("fold").moves().operation(
-            "unfold",
-            |c, cx, (): ()| c.begin(cx, Drives::unfold),
-        );
+        b.doc("The quill to its upper stop, then the carriage to its end. Takes seconds.")
+            .no_effect()
+            .moves()
+            .operation("home", |c, cx, (): ()| c.begin(cx, Drives::home));
+        b.doc("To the working pose, and holds there. Takes seconds.")
+            .undone_by("fold")
+            .moves()
+            .operation("unfold", |c, cx, (): ()| c.begin(cx, Drives::unfold));
         b.doc("Folded, the quill at its top, the carriage at its end. Takes seconds.")
             .undone_by("unfold")
             .moves()
@@ -150,7 +150,9 @@ impl Component for Driver {
             plant: b.doc("Where the axes are.").required().input("plant"),
             effort: b.doc("Forces and torques of the arm, heard in mode 2; the rail's is not.").input("effort"),
             rail: b.doc("Where the carriage is to go, heard in mode 2.").unit("m/s").input("rail"),
-            watched: b.doc("Whatever whoever watches writes. Silent for 40 ms in mode 2: e_watch_lost.").input("watched"),
+            watched: b
+                .doc("Whatever whoever watches writes. Silent for 40 ms in mode 2: e_watch_lost.")
+                .input("watched"),
             command: b.doc("What is done to the arm.").output("command"),
             axes: b.doc("Where the axes are, and how they move.").output("axes"),
             mode: b.doc("What the drives do: 0, 1 or 2.").output("mode"),

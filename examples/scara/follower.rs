@@ -171,7 +171,10 @@ impl Component for Torques {
                 .unit("1/s")
                 .range(0.0..=10.0)
                 .property("recenter", 4.0),
-            friction_comp: b.doc("Share of Coulomb's friction taken off while it is coupled.").range(0.0..=1.0).property("friction_comp", 0.9),
+            friction_comp: b
+                .doc("Share of Coulomb's friction taken off while it is coupled.")
+                .range(0.0..=1.0)
+                .property("friction_comp", 0.9),
             enabled: b.doc("Whether the carriage may move at all.").property("enabled", true),
             arm: Arm { payload: BELIEVED_PAYLOAD },
             speed: 0.0,

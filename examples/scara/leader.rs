@@ -167,7 +167,11 @@ impl Component for Leader {
             cut: b.doc("Nothing gets through.").property("cut", false),
             stiffness: b.doc("Spring of its coupling.").unit("N/m").range(0.0..=1000.0).property("stiffness", 300.0),
             damping_rel: b.doc("Damper.").unit("N s/m").range(0.0..=200.0).property("damping_rel", 12.0),
-            damping_abs: b.doc("Damper on its own speed.").unit("N s/m").range(0.0..=200.0).property("damping_abs", 2.0),
+            damping_abs: b
+                .doc("Damper on its own speed.")
+                .unit("N s/m")
+                .range(0.0..=200.0)
+                .property("damping_abs", 2.0),
             most: b.doc("Largest force.").unit("N").range(0.0..=40.0).property("most", 15.0),
             ways: Box::new([Way::new(1), Way::new(2)]),
             other: None,
@@ -186,12 +190,8 @@ impl Component for Leader {
 
     fn update(&mut self, cx: &mut Context) {
         let (now, dt) = (cx.now().as_secs_f64(), cx.dt());
-        let quality = Quality {
-            delay: self.delay.get(),
-            jitter: self.jitter.get(),
-            loss: self.loss.get(),
-            cut: self.cut.get(),
-        };
+        let quality =
+            Quality { delay: self.delay.get(), jitter: self.jitter.get(), loss: self.loss.get(), cut: self.cut.get() };
         if self.seed.changed() {
             self.draw_anew();
         }

@@ -51,8 +51,7 @@ pub const PARKED: [f64; AXES] = [-0.38, 1.75, 2.40, -0.002, 0.0];
 pub const WORKING: [f64; AXES] = [0.0, 0.785, 1.571, -0.10, 0.0];
 
 /// Stiffness and damping of the stops, N/m and N s/m, for the joints N m/rad and N m s/rad.
-const STOPS: [(f64, f64); AXES] =
-    [(60_000.0, 1200.0), (4000.0, 40.0), (3000.0, 30.0), (20_000.0, 200.0), (200.0, 1.0)];
+const STOPS: [(f64, f64); AXES] = [(60_000.0, 1200.0), (4000.0, 40.0), (3000.0, 30.0), (20_000.0, 200.0), (200.0, 1.0)];
 /// What a motor with shorted windings adds to the viscous friction.
 const SHORTED: [f64; AXES] = [200.0, 6.0, 3.0, 100.0, 0.1];
 /// What the quill's brake holds, in N.

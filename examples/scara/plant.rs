@@ -64,7 +64,10 @@ impl Component for Plant {
                 .range(0.0..=5.0)
                 .tunable(Tunable::Unconfigured)
                 .property("payload", super::drives::BELIEVED_PAYLOAD),
-            friction: b.doc("Its friction, as a multiple of the nominal one.").range(0.0..=5.0).property("friction", 1.0),
+            friction: b
+                .doc("Its friction, as a multiple of the nominal one.")
+                .range(0.0..=5.0)
+                .property("friction", 1.0),
             body: Body::new(PARKED.into(), 0.0),
             push: (V4::zeros(), 0.0),
         }
@@ -77,8 +80,7 @@ impl Component for Plant {
         self.push.1 -= cx.dt();
         let push = if self.push.1 > 0.0 { self.push.0 } else { V4::zeros() };
         self.body.friction = self.friction.get();
-        let done =
-            Done { effort: V5::from(command.effort), push, shorted: command.shorted, brake: command.brake };
+        let done = Done { effort: V5::from(command.effort), push, shorted: command.shorted, brake: command.brake };
         self.body.advance(&done, cx.dt());
         self.publish();
     }

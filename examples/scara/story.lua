@@ -83,13 +83,26 @@ end
 
 -- What goes wrong -------------------------------------------------------------------------------------------------------
 
+-- A recording that begins while the tool moves at about its fastest.
+local function in_motion(name)
+  for _ = 1, 1000 do
+    local v, square = signal("Plant.tool.v"), 0
+    for i = 1, 3 do square = square + v[i]^2 end
+    if square > 0.07^2 then break end
+    wait(0.01)
+  end
+  local s = record(name, 0.001)
+  wait(0.05)
+  return s, now()
+end
+
 -- It is stopped at `at`: at rest 0.3 s later, and nothing moves for two seconds after that. `by`: recorded since before.
 local function stays(name, s, at)
   wait(at + 2.3 - now())
   s:stop()
   local before = motion(s, at - 0.02, at)
   local after, way = motion(s, at + 0.3, at + 2.3)
-  expect{ name = name .. ": it was in motion", value = before, min = 0.02, unit = "m/s" }
+  expect{ name = name .. ": it was in motion", value = before, min = 0.05, unit = "m/s" }
   expect{ name = name .. ": 0.3 s later", value = after, max = 0.02, unit = "m/s" }
   expect{ name = name .. ": its way in 2 s from then on", value = way, max = 1, unit = "mm" }
   local step = 0
@@ -178,9 +191,7 @@ wait_answer("undo.done", 1)
 assert(property("Follower.stiffness") == 300)
 
 -- The handle is not heard: the arm is let go, and it stands.
-local s = record("cut", 0.001)
-wait(0.05)
-local at = now()
+local s, at = in_motion("cut")
 change("Leader.cut", true)
 wait_answer("e_link_lost", 0.2)
 expect{ name = "not heard: noticed after", value = 1000 * (now() - at), max = 120, unit = "ms" }
@@ -196,9 +207,7 @@ raise("e_8dof")
 wait(1)
 
 -- What the handle tells jumps: the arm is let go and the rail stands, until somebody says so.
-local s = record("jump", 0.001)
-wait(0.05)
-local at = now()
+local s, at = in_motion("jump")
 inject("Leader", "jump", { x = 0.3, seconds = 0.2 })
 wait_answer("e_force_spike", 1)
 expect{ name = "the reference jumps: noticed after", value = 1000 * (now() - at), max = 20, unit = "ms" }
@@ -209,8 +218,8 @@ raise("e_reset")
 couple()
 
 -- Somebody shoves the tool: it gives way, and gets too fast. It brakes while the shove goes on.
-local s, at = record("push", 0.001), now() + 0.05
-inject("Plant", "push", { x = 20, y = 50, seconds = 0.1 }, at)
+local s, at = in_motion("push")
+inject("Plant", "push", { x = 20, y = 50, seconds = 0.1 })
 wait_answer("e_overspeed", 1)
 local heard = now()
 expect{ name = "54 N for 0.1 s: noticed after", value = 1000 * (heard - at), max = 200, unit = "ms" }
@@ -220,8 +229,8 @@ raise("e_reset")
 couple()
 
 -- A motor takes too much current: heard, braked; after a reset it takes torques again before anything couples.
-local s, at = record("overcurrent", 0.001), now() + 0.05
-inject("Drives", "overcurrent", {}, at)
+local s, at = in_motion("overcurrent")
+inject("Drives", "overcurrent", {})
 wait_answer("e_OVERCURRENT", 1)
 expect{ name = "overcurrent: heard after", value = 1000 * (now() - at), max = 5, unit = "ms" }
 wait_answer("safe_hold.ok", 0.01)
@@ -233,8 +242,8 @@ assert(signal("Drives.wrong") == 0)
 couple()
 
 -- The controller dies: braked, and begun anew without asking.
-local s, at = record("controller", 0.001), now() + 0.05
-inject("Follower", "panic", {}, at)
+local s, at = in_motion("controller")
+inject("Follower", "panic", {})
 wait_answer("e_controller_lost", 1)
 expect{ name = "the controller dies: noticed after", value = 1000 * (now() - at), max = 50, unit = "ms" }
 wait_answer("safe_hold.ok", 0.01)
@@ -246,8 +255,8 @@ s:stop()
 couple()
 
 -- What commands the drives dies: they hold by themselves. It stays so, and it is led down all the same.
-local s, at = record("torques", 0.001), now() + 0.05
-inject("Torques", "panic", {}, at)
+local s, at = in_motion("torques")
+inject("Torques", "panic", {})
 wait_answer("e_cmd_watchdog", 1)
 expect{ name = "nobody commands the drives: noticed after", value = 1000 * (now() - at), max = 50, unit = "ms" }
 wait_answer("safe_hold.ok", 0.01)
@@ -260,9 +269,7 @@ expect{ name = "down from there: left", value = left_behind(10), max = 0 }
 raise("e_start")
 wait_state("unfolding", 5)
 wait(1)
-local s = record("unfolding", 0.001)
-wait(0.05)
-local at = now()
+local s, at = in_motion("unfolding")
 raise("e_estop")
 wait_answer("safe_hold.ok", 0.001)
 stays("stopped while it unfolds", s, at)
