@@ -288,11 +288,10 @@ impl Drives {
     fn advance(&mut self, rail: f64, dt: f64) -> Option<Ended> {
         match self.task {
             Task::Idle => {
-                for i in 0..AXES {
-                    let (now, most) = (self.target_speed[i], QUICK_STOP[i]);
+                for (i, most) in QUICK_STOP.into_iter().enumerate() {
                     let follows = self.mode == Mode::Torques && i == RAIL;
                     let wanted = if follows { rail.clamp(-RAIL_SPEED, RAIL_SPEED) } else { 0.0 };
-                    let step = (wanted - now).clamp(-most * dt, most * dt);
+                    let step = (wanted - self.target_speed[i]).clamp(-most * dt, most * dt);
                     self.target_gain[i] = step / dt;
                     self.target_speed[i] += step;
                 }

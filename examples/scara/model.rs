@@ -3,6 +3,7 @@
 //! All numbers are this example's own: sizes, masses and friction of a small SCARA with 0.45 m of reach, of no make.
 
 use nalgebra::{SMatrix, SVector};
+use std::f64::consts::TAU;
 
 /// Rail (m), shoulder, elbow (rad), quill (m, up), wrist (rad).
 pub const AXES: usize = 5;
@@ -40,9 +41,9 @@ const GRAVITY: f64 = 9.81;
 pub const COULOMB: [f64; AXES] = [12.0, 1.2, 0.7, 6.0, 0.05];
 const VISCOUS: [f64; AXES] = [40.0, 0.8, 0.5, 20.0, 0.01];
 /// The ends of the axes' ranges.
-pub const LOWER: [f64; AXES] = [-0.40, -2.27, -2.53, -0.20, -6.28];
+pub const LOWER: [f64; AXES] = [-0.40, -2.27, -2.53, -0.20, -TAU];
 /// Upper ends.
-pub const UPPER: [f64; AXES] = [0.40, 2.27, 2.53, 0.0, 6.28];
+pub const UPPER: [f64; AXES] = [0.40, 2.27, 2.53, 0.0, TAU];
 /// What the motors give at most, N or N m.
 pub const LARGEST: [f64; AXES] = [250.0, 25.0, 12.0, 100.0, 1.5];
 /// Folded, the quill at its top, the carriage at its end: nothing has to hold it there.

@@ -55,7 +55,7 @@ impl Component for Plant {
             tool: b.doc("Where its tool truly is, and how it moves.").output("tool"),
             start: b
                 .doc("Where its axes are when the simulation begins, m and rad.")
-                .range(-6.28..=6.28)
+                .range(-6.3..=6.3)
                 .tunable(Tunable::Unconfigured)
                 .property("start", PARKED),
             payload: b

@@ -4,9 +4,10 @@
 --
 -- It comes up, finds the handle that it follows, and copies it: arm and rail (`eight_DOF`), then the arm alone (`five_DOF`). Then things go
 -- wrong in the middle of that, and on the way up; each time all of it comes to rest and stays there. Down to nothing at the end.
---   --set seconds=60 --set seed=7 --set delay=0.02    for how long each mode is measured; the network's seed, and one way in s
+--   --set seconds=60 --set seed=7 --set delay=0.01 --set friction=1.3    for how long each mode is measured; the network's seed, and one way
+--   in s (over 15 ms the coordinator refuses rail and arm); the arm's friction as a multiple of what the drives believe
 
-local seconds, seed, delay = param("seconds", 20), param("seed", 1), param("delay", 0.005)
+local seconds, seed, delay, friction = param("seconds", 20), param("seed", 1), param("delay", 0.005), param("friction", 1)
 
 local function change(what, value) set(what, value, { force = true, within = 1 }) end
 
@@ -130,6 +131,7 @@ deploy("deployment.yaml")
 figure{ name = "up after", value = now(), unit = "s" }
 change("Leader.delay", delay)
 change("Leader.seed", seed)
+change("Plant.friction", friction)
 wait_state("harmonizing", 2)
 wait_state("eight_DOF_mode", 10)
 expect{ name = "engaging: force in the first 0.3 s", value = (function()
