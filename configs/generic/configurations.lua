@@ -1,4 +1,4 @@
--- What the youBot's coordinator asks for, said for another robot: a seven-joint arm with brakes on a cart.
+-- What the youBot's coordinator asks for, said for component types that are only declared: an arm with brakes on a cart.
 
 ConfiguratorConf {
   create_core     = Configuration { create("arm", "Arm", { activity = "loop" }),

@@ -3,7 +3,7 @@
 --
 -- It is pure: states, and names of events to raise. It names no component, no port, no platform: what the names mean
 -- here is said by the deployment's configurations, and the same file coordinates another platform over other ones
--- (deployments/generic_arm.yaml). In an rFSM statechart the outer state's transition wins over the inner one's.
+-- (examples/scara). In an rFSM statechart the outer state's transition wins over the inner one's.
 
 -- These stop the robot wherever its drives have power: it brakes, and nothing moves until it is asked for.
 local STOPS = { "e_estop", "e_EMERGENCY_STOP", "e_OVERCURRENT", "e_OVERTEMP", "e_EC_TIMEOUT", "e_ENCODER_ERR",

@@ -82,25 +82,6 @@ fn simulated_time_tells_the_same_story_twice() {
     assert!(first.iter().any(|line| line.ends_with("park.ok")), "{first:?}");
 }
 
-/// The paper's hypothesis: the same coordinator file, unchanged, over two platforms' configurations.
-#[test]
-fn one_coordinator_drives_two_platforms() {
-    let states = |file: &str| -> Vec<String> {
-        let words = |line: &String| line.split_once(" in ").map(|(_, state)| state.to_owned());
-        up_and_down(file).iter().filter_map(words).collect()
-    };
-    let coordinator = |file: &str| {
-        let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(file)).unwrap();
-        text.lines().find_map(|l| l.strip_prefix("coordinator: ").map(str::to_owned)).unwrap()
-    };
-    let (youbot, generic) = ("deployments/youbot_arm.yaml", "deployments/generic_arm.yaml");
-    assert_eq!(coordinator(youbot), coordinator(generic), "one file");
-    let (a, b) = (checked(youbot), checked(generic));
-    assert_ne!(a.deployment.platform, b.deployment.platform);
-    assert_eq!(a.deployment.coordinators[0].chart, b.deployment.coordinators[0].chart);
-    assert_eq!(states(youbot), states(generic), "the same states in the same order");
-}
-
 #[test]
 fn the_examples_stories_run_as_scripts() {
     for story in [

@@ -236,32 +236,3 @@ fn unheard<'e>(
     });
     unheard
 }
-
-/// The hypothesis of the paper: one coordinator, unchanged, over two platforms.
-#[test]
-fn the_same_coordinator_over_another_platform() {
-    let (youbot, of_the_youbot) = deployment("youbot_arm");
-    let (generic, catalogue) = deployment("generic_arm");
-    let text = |name: &str| {
-        let yaml = std::fs::read_to_string(format!("deployments/{name}.yaml")).unwrap();
-        yaml.lines().find(|l| l.starts_with("coordinator:")).expect("a coordinator").to_owned()
-    };
-    assert_eq!(text("youbot_arm"), text("generic_arm"));
-    assert_ne!(youbot.platform, generic.platform);
-    for configuration in &generic.configurations {
-        assert!(youbot.configuration(configuration.id).is_some(), "{}", configuration.id);
-    }
-    assert!(catalogue.iter().all(|ty| of_the_youbot.get(ty.name).is_none()));
-    // And the coordinator names neither a component nor a type of either platform.
-    let coordinator = std::fs::read_to_string("configs/youbot/coordinator.lua").unwrap();
-    let code: String = coordinator.lines().map(|l| l.split("--").next().unwrap_or_default()).collect();
-    for (deployment, catalogue) in [(&youbot, of_the_youbot), (&generic, catalogue)] {
-        let mut system = System::new(catalogue);
-        go(&mut system, deployment, &UP[..3]);
-        for name in system.snapshot().components.keys() {
-            let name = name.to_string();
-            let named = code.split(|c: char| !c.is_ascii_alphanumeric() && c != '_').any(|word| word == name);
-            assert!(!named, "the coordinator names `{name}`");
-        }
-    }
-}
