@@ -353,6 +353,11 @@ impl Product<'_> {
         }
     }
 
+    /// So many events are on their way at once: two for each where there are many coordinators, for one event may be for all of them.
+    pub(super) fn most_between(&self) -> usize {
+        limits::CHECK_INBOX.max(2 * self.members.len())
+    }
+
     /// Puts an event into the inbox of everybody but the one that emits it.
     pub(super) fn spread(&mut self, state: &mut ProductState, name: EventName, but: Option<usize>) {
         for number in 0..self.members.len() {
@@ -369,7 +374,7 @@ impl Product<'_> {
             {
                 continue;
             }
-            if state.inbox.len() >= limits::CHECK_INBOX {
+            if state.inbox.len() >= self.most_between() {
                 self.overflow = true;
                 continue;
             }

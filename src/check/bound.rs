@@ -97,7 +97,7 @@ impl Bound {
                              several"
                 .to_owned(),
             Self::Aside => "what only several undos that failed bring about together was not followed".to_owned(),
-            Self::Inbox => format!("more than {} events between coordinators were not followed", limits::CHECK_INBOX),
+            Self::Inbox => format!("more than {} events between coordinators, or two for each, were not followed", limits::CHECK_INBOX),
             Self::Forks => format!(
                 "a step that asks for more than {} things, or that may meet what is under way in more than {} ways, was not \
                  followed to its end",

@@ -59,7 +59,7 @@ impl Product<'_> {
         if state.across {
             return;
         }
-        if state.inbox.len() + self.members.len() > limits::CHECK_INBOX {
+        if state.inbox.len() + self.members.len() > self.most_between() {
             self.overflow = true;
             return;
         }

@@ -83,5 +83,6 @@ pub const CHECK_TOLD: usize = 4;
 /// has a few. A connection is looked at for every pair of them.
 pub const CHECK_TYPES: usize = 16;
 
-/// Events on their way between coordinators that `check` follows: two that answer each other for ever fill it.
+/// Events on their way between coordinators that `check` follows, of more than three coordinators two for each: two that answer each other for
+/// ever fill it.
 pub const CHECK_INBOX: usize = 6;

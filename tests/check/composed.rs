@@ -474,3 +474,51 @@ fn a_fault_may_be_of_a_step_of_a_subsystem_that_exports_nothing_of_it() {
     assert_eq!(with("operation_call left/D.brak").len(), 1);
     assert_eq!(with("start middle/D").len(), 1);
 }
+
+/// So many arms with nothing in common, each led by a coordinator of its own.
+fn fleet(n: usize) -> Sources {
+    let lead = "return state { idle = state {}, raising = state { entry = 'NAME/e_start' }, on = state {}, failed = state {},
+  lowering = state { entry = { 'NAME/e_shutdown', 'NAME/e_released' } },
+  trans { src = 'initial', tgt = 'idle' }, trans { src = 'idle', tgt = 'raising', events = { 'e_start' } },
+  trans { src = 'raising', tgt = 'on', events = { 'NAME/up' } }, trans { src = 'raising', tgt = 'failed', events = { 'NAME/failed' } },
+  trans { src = 'raising', tgt = 'lowering', events = { 'e_shutdown' } }, trans { src = 'failed', tgt = 'lowering', events = { 'e_shutdown' } },
+  trans { src = 'on', tgt = 'lowering', events = { 'e_shutdown' } }, trans { src = 'lowering', tgt = 'idle', events = { 'NAME/down' } } }";
+    let all = |of: &dyn Fn(usize) -> String| (0..n).map(of).collect::<Vec<_>>().join(", ");
+    let fleet = format!(
+        "davit: 1\nname: fleet\nplatform: simulated\ntypes: {{}}\nsubsystems: {{ {} }}\nconfigurations: [none.lua]\ncoordinators: {{ {} }}\n\
+         deploy: {{ event: e_start, up: [{}], within_s: 10 }}\nshutdown: {{ event: e_shutdown, down: [{}], within_s: 10 }}\n",
+        all(&|i| format!("r{i}: {{ deployment: arm.yaml }}")),
+        all(&|i| format!("c{i}: c{i}.lua")),
+        all(&|i| format!("c{i}:on")),
+        all(&|i| format!("c{i}:idle")),
+    );
+    let mut files = vec![
+        ("arm.yaml".to_owned(), ARM.to_owned()),
+        ("arm_conf.lua".to_owned(), ARM_CONF.to_owned()),
+        ("arm.lua".to_owned(), ARM_COORDINATOR.to_owned()),
+        ("none.lua".to_owned(), "ConfiguratorConf {}".to_owned()),
+        ("fleet.yaml".to_owned(), fleet),
+    ];
+    files.extend((0..n).map(|i| (format!("c{i}.lua"), lead.replace("NAME", &format!("r{i}")))));
+    Sources::memory(files)
+}
+
+/// What many subsystems take beside their own file grows with their number, and no faster.
+#[test]
+fn eight_take_less_than_twice_what_two_take() {
+    let followed = |n: usize| {
+        let whole = load(&fleet(n), "fleet.yaml", &[]).deployment.unwrap();
+        let report = check::run(whole.clone(), &catalogue(&whole));
+        let errors: Vec<&Finding> =
+            report.findings.iter().filter(|finding| finding.severity > Severity::Info).collect();
+        assert!(
+            errors.is_empty() && report.verdict == check::CheckVerdict::Sound,
+            "{n}: {errors:#?} {:?}",
+            report.left
+        );
+        report.explored.states
+    };
+    let (two, eight, nine) = (followed(2), followed(8), followed(9));
+    assert!(eight < 2 * two, "{two} {eight}");
+    assert_eq!(nine - eight, (eight - two) / 6, "each takes the same");
+}
