@@ -1,5 +1,6 @@
 //! The youBot reference application, measured in simulated time.
 
+mod before;
 mod bench;
 mod chatter;
 mod composed;
