@@ -21,6 +21,7 @@ mod motion;
 mod passive;
 mod robot;
 mod scenarios;
+mod stability;
 mod stops;
 mod two;
 mod variants;
