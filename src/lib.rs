@@ -148,8 +148,8 @@ pub mod component {
 pub mod platforms {
     pub use crate::app::{Making, PlatformMaker};
     pub use crate::model::{
-        Catalogue, Cause, ComponentSnapshot, ComponentType, Execution, Injection, Outcome, PlatformKind, PropertyType,
-        Tunable,
+        Call, Catalogue, Cause, ComponentSnapshot, ComponentType, Execution, Injection, MemberRef, Outcome,
+        PlatformKind, PropertyType, Tunable,
     };
     pub use crate::platform::conformance;
     pub use crate::platform::simulated::{Simulated, SimulatedOptions};

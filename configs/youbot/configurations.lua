@@ -4,13 +4,18 @@
 -- The four configurations of the coupling's switch are in coupling.lua.
 
 -- `stand_in`: a stand-in for the other robot is part of the deployment (deployments/youbot_arm.yaml). In the coupling of two robots there
--- is none (deployments/youbot_robot.yaml): what the link sends and hears is exported. `hand`: what the operator's hand does,
--- `ifname`: the network interface of the drives' bus, which a driver has for itself.
+-- is none (deployments/youbot_robot.yaml): what the link sends and hears is exported. `hand`: what the operator's hand does, `ifname`: the
+-- network interface of the drives' bus, which a driver has for itself, `law`: of the coupling, the same at both ends.
 
 local function with_stand_in(changes, more)
   if stand_in then
     for _, change in ipairs(more()) do table.insert(changes, change) end
   end
+  return changes
+end
+
+local function with_law(changes)
+  if not stand_in and law ~= "position" then table.insert(changes, property_set("Cart_Impedance.law", law)) end
   return changes
 end
 
@@ -90,7 +95,7 @@ ConfiguratorConf {
     connect("Peer.tx",                       "Link_Rx.rx", { buffer = 64 }),
   } end)),
 
-  load_properties = Configuration(with_stand_in({ description = "this robot's own numbers, then everything configured",
+  load_properties = Configuration(with_law(with_stand_in({ description = "this robot's own numbers, then everything configured",
     property_set("World.robot1_q_start",         { 0.0, -1.1257, 2.5395, -1.7802, 0.0 }),
     property_set("Cart_Impedance.stiffness",     150.0),
     property_set("Cart_Impedance.damping_abs",   5.0),
@@ -100,7 +105,7 @@ ConfiguratorConf {
   }, function() return {
     property_set("Peer.delay",                   0.005),
     property_set("Peer.force_gain",              { 0.1, 0.1, 0.1 }),   -- its base yields as ours does
-  } end)),
+  } end))),
 
   start_driver = Configuration { description = "drives on, brakes closed: the arm rests on its stops",
     post_conf_state = { "World:running", "youbot:running" },
@@ -169,6 +174,27 @@ ConfiguratorConf {
   restart_controller = Configuration { description = "the impedance controller from the beginning",
     pre_conf_state  = { "Cart_Impedance:unconfigured" },
     post_conf_state = { "Cart_Impedance:running" },
+  },
+
+  restart_kinematics = Configuration { description = "the kinematics from the beginning",
+    pre_conf_state  = { "Arm_Kinematics:unconfigured" },
+    post_conf_state = { "Arm_Kinematics:running" },
+  },
+  restart_dynamics = Configuration { description = "the dynamics from the beginning",
+    pre_conf_state  = { "Dynamics:unconfigured" },
+    post_conf_state = { "Dynamics:running" },
+  },
+  restart_base = Configuration { description = "the base's controller from the beginning",
+    pre_conf_state  = { "Base_Ctrl:unconfigured" },
+    post_conf_state = { "Base_Ctrl:running" },
+  },
+  restart_link = Configuration { description = "both ends of the link from the beginning",
+    pre_conf_state  = { "Link_Tx:unconfigured", "Link_Rx:unconfigured" },
+    post_conf_state = { "Link_Rx:running", "Link_Tx:running" },
+  },
+  restart_monitors = Configuration { description = "the monitors from the beginning",
+    pre_conf_state  = { "Monitors:unconfigured" },
+    post_conf_state = { "Monitors:running" },
   },
 
   -- Teardown ---------------------------------------------------------------------------------------------------------

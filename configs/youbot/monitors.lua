@@ -67,7 +67,8 @@ Monitors {
 
   -- What must not happen -------------------------------------------------------------------------------------------------
 
-  torque_saturated = monitor { when = above("Dynamics.tau_sat", 0):for_at_least(0.5),
+  -- Of what the controller believes that the drives have, or of what they have.
+  torque_saturated = monitor { when = any { above("Dynamics.tau_sat", 0), above("youbot.tau_sat", 0) }:for_at_least(0.5),
     event = "e_torque_sat", repeat_every = AGAIN },
   overspeed = monitor { when = above(fastest, 1.5), event = "e_overspeed", repeat_every = AGAIN },
   -- The acceptance motion is never so fast for so long: the arm gives way to whoever pushes it, too slowly for the limit above.

@@ -1,10 +1,12 @@
 //! The platforms of a program: the built-in ones, and those that it brings itself.
 
 use super::Checked;
+use crate::functions::HostFunction;
 use crate::model::codes::{DEPLOY_PLATFORM_OPTION, DEPLOY_UNKNOWN_PLATFORM};
 use crate::model::finding::did_you_mean;
 use crate::model::{Deployment, Finding, Findings, Ident, PlatformKind, Value, ValueType};
 use crate::platform::Platform;
+use crate::platform::embedded::EmbeddedPlatform;
 use crate::runtime::Libraries;
 use crate::time::Clock;
 use std::collections::BTreeMap;
@@ -32,6 +34,7 @@ impl From<Libraries> for Extensions {
             name: Ident::new(name).expect("the name of a built-in platform"),
             kind: *kind,
             options: Vec::new(),
+            functions: Vec::new(),
             make: if kind.imitates { Make::Simulated } else { Make::Embedded },
         });
         Self { libraries, platforms: built_in.collect() }
@@ -99,6 +102,7 @@ pub struct PlatformMaker {
     name: Ident,
     kind: PlatformKind,
     options: Vec<PlatformOption>,
+    functions: Vec<PlatformFunction>,
     pub(super) make: Make,
 }
 
@@ -121,6 +125,15 @@ struct PlatformOption {
     doc: String,
 }
 
+/// A function of a platform for coordinators with functions.
+#[derive(Clone)]
+struct PlatformFunction {
+    name: Ident,
+    call: Arc<CallPlatform>,
+}
+
+type CallPlatform = dyn Fn(&dyn Platform, &Clock, &[Value]) -> Result<Value, String> + Send + Sync;
+
 /// What a platform is made from.
 #[derive(Debug)]
 pub struct Making<'a> {
@@ -130,6 +143,13 @@ pub struct Making<'a> {
     pub clock: &'a Clock,
     /// The options, each of its type; those that the deployment does not give have their defaults.
     pub options: &'a BTreeMap<Ident, Value>,
+}
+
+impl Making<'_> {
+    /// The platform on which components of this process run, the built-in `embedded`: for one that is made around it.
+    pub fn embedded(&self) -> Arc<dyn Platform> {
+        Arc::new(EmbeddedPlatform::new(self.clock, &self.checked.libraries, &self.checked.deployment.activities))
+    }
 }
 
 impl fmt::Debug for PlatformMaker {
@@ -149,7 +169,7 @@ impl PlatformMaker {
         make: impl Fn(&Making<'_>) -> Result<Arc<dyn Platform>, String> + Send + Sync + 'static,
     ) -> Self {
         let name = Ident::new(name).unwrap_or_else(|error| panic!("a platform's name: {error}"));
-        Self { name, kind, options: Vec::new(), make: Make::Own(Arc::new(make)) }
+        Self { name, kind, options: Vec::new(), functions: Vec::new(), make: Make::Own(Arc::new(make)) }
     }
 
     /// With an option that deployments may give it; one without a default must be given. `doc` is shown to people.
@@ -162,6 +182,34 @@ impl PlatformMaker {
         let default = default.map(|v| v.fit(&ty).unwrap_or_else(|error| panic!("the default of `{name}`: {error}")));
         self.options.push(PlatformOption { name, ty, default, doc: doc.to_owned() });
         self
+    }
+
+    /// With a function that coordinators with functions of a deployment on this platform find as a global, as an rFSM model finds what its
+    /// program gives it. Its error is one of Lua's.
+    ///
+    /// It is called in the coordinator's own thread, which reacts to nothing until it returns. What it does to components is done
+    /// behind the configurator's back: no claim keeps it out, no undo takes it back. No built-in platform has any.
+    ///
+    /// # Panics
+    /// When `name` is no plain name.
+    #[must_use]
+    pub fn function(
+        mut self,
+        name: &str,
+        call: impl Fn(&dyn Platform, &Clock, &[Value]) -> Result<Value, String> + Send + Sync + 'static,
+    ) -> Self {
+        let name = Ident::new(name).unwrap_or_else(|error| panic!("a platform's function: {error}"));
+        self.functions.push(PlatformFunction { name, call: Arc::new(call) });
+        self
+    }
+
+    /// Its functions, of one that was made.
+    pub(super) fn functions_of(&self, platform: &Arc<dyn Platform>, clock: &Clock) -> Vec<HostFunction> {
+        let one = |function: &PlatformFunction| {
+            let (call, platform, clock) = (function.call.clone(), platform.clone(), clock.clone());
+            HostFunction { name: function.name, call: Arc::new(move |values| call(&*platform, &clock, values)) }
+        };
+        self.functions.iter().map(one).collect()
     }
 
     /// Gives each option its value of the right type, or says what is wrong with those of the deployment.

@@ -6,7 +6,6 @@ use crate::functions::Opener;
 use crate::limits;
 use crate::model::{Coordinator, Deployment, FaultKind, Findings, SimulatedReaction, StepFault};
 use crate::platform::Platform;
-use crate::platform::embedded::EmbeddedPlatform;
 use crate::platform::simulated::{self, Fault, FaultRule, Simulated, StepPattern};
 use crate::session::{Session, SessionSetup};
 use crate::statechart;
@@ -108,8 +107,9 @@ pub(super) fn start_open(
     for opener in openers(checked).into_iter().flatten() {
         opener.open(None).map_err(|failure| StartError::Functions { why: failure.to_string() })?;
     }
+    let making = Making { checked, clock, options: &deployment.platform_options };
     let (platform, simulated): (Arc<dyn Platform>, _) = match &checked.platform.make {
-        Make::Embedded => (Arc::new(EmbeddedPlatform::new(clock, &checked.libraries, &deployment.activities)), None),
+        Make::Embedded => (making.embedded(), None),
         Make::Simulated => {
             let reactions = if played == Played::Replayed { Vec::new() } else { reactions(deployment) };
             let options = simulated::SimulatedOptions {
@@ -122,7 +122,6 @@ pub(super) fn start_open(
             (Arc::new(platform.clone()), Some(platform))
         }
         Make::Own(make) => {
-            let making = Making { checked, clock, options: &deployment.platform_options };
             let name = deployment.platform.to_string();
             let platform = make(&making).map_err(|why| StartError::Platform { name: name.clone(), why })?;
             let findings = crate::check::on_platform(deployment, &checked.catalogue, platform.catalogue());
@@ -141,9 +140,11 @@ pub fn start_on(checked: &Checked, platform: Arc<dyn Platform>, clock: &Clock) -
         let (chart, _) = statechart::compile(written);
         Arc::new(chart.expect("a checked deployment's coordinators compile"))
     });
+    let host = checked.platform.functions_of(&platform, clock);
+    let openers = openers(checked).into_iter().map(|opener| opener.map(|opener| opener.with_host(host.clone())));
     Session::start(SessionSetup {
         deployment: checked.deployment.share(),
-        functions: openers(checked),
+        functions: openers.collect(),
         charts: charts.collect(),
         catalogue: checked.catalogue.clone(),
         platform,

@@ -42,4 +42,5 @@ pub use guards::{Guards, install as guard, loops};
 #[cfg(any(test, feature = "internals"))]
 pub use lab::Lab;
 pub use lower::{Problem, Spot};
-pub use open::{Functions, NotOpened, Opener, Reads, read};
+pub use open::{Functions, HostFunction, NotOpened, Opener, Reads, read};
+pub use values::{of_value, to_value};

@@ -7,13 +7,14 @@ use super::host::{FileReader, Host};
 use super::lower::{self, Problem, Spot};
 use super::tables::address;
 use super::unset::UnsetWatch;
+use super::values::{of_value, to_value};
 use super::world::{run_program, state};
 use crate::limits;
 use crate::model::program::{AuxiliaryFunction, Program};
-use crate::model::{Origin, Statechart};
+use crate::model::{Ident, Origin, Statechart};
 use crate::statechart::{FunctionOutput, Printer};
 use crate::time::Clock;
-use mlua::{Function, Lua, Table, Value};
+use mlua::{Function, Lua, MultiValue, Table, Value};
 use std::sync::Arc;
 
 /// Why a program gives no machine.
@@ -124,17 +125,53 @@ fn template(lua: &Lua, host: &Host, program: &Program) -> Result<Table, NotOpene
     }
 }
 
+/// A function that a model finds as a global, beside its own: what rFSM's program gives to it.
+#[derive(Clone)]
+pub struct HostFunction {
+    /// Its name.
+    pub name: Ident,
+    /// What it does, in the coordinator's own thread.
+    pub call: Arc<CallHost>,
+}
+
+type CallHost = dyn Fn(&[crate::model::Value]) -> Result<crate::model::Value, String> + Send + Sync;
+
+impl std::fmt::Debug for HostFunction {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_tuple("HostFunction").field(&self.name).finish()
+    }
+}
+
+impl HostFunction {
+    fn give(&self, lua: &Lua) -> mlua::Result<()> {
+        let call = self.call.clone();
+        let function = lua.create_function(move |lua, values: MultiValue| {
+            let values = values.iter().map(to_value).collect::<mlua::Result<Vec<_>>>()?;
+            of_value(lua, &call(&values).map_err(mlua::Error::runtime)?)
+        })?;
+        lua.globals().raw_set(self.name.as_str(), function)
+    }
+}
+
 /// Opens the functions of a program where they are to be called.
 #[derive(Debug, Clone)]
 pub struct Opener {
     program: Arc<Program>,
     chart: Arc<Statechart>,
+    host: Vec<HostFunction>,
 }
 
 impl Opener {
     /// The functions of `program`, whose chart is `chart`.
     pub fn new(program: Arc<Program>, chart: Arc<Statechart>) -> Self {
-        Self { program, chart }
+        Self { program, chart, host: Vec::new() }
+    }
+
+    /// With functions of the program that runs it. They are there once the texts were run: what a text makes must not depend on them.
+    #[must_use]
+    pub fn with_host(mut self, host: Vec<HostFunction>) -> Self {
+        self.host = host;
+        self
     }
 
     /// Runs the program on this thread and answers its functions. They cannot leave the thread.
@@ -156,6 +193,7 @@ impl Opener {
         let simulated = clock.as_ref().is_none_or(Clock::is_simulated);
         *host.clock.borrow_mut() = clock;
         let template = template(&lua, &host, program)?;
+        self.host.iter().try_for_each(|function| function.give(&lua)).map_err(failed)?;
         // What the texts print was told when they were read.
         host.voice.drain(&mut Vec::new());
         let init: Function = host.rfsm(&lua).and_then(|rfsm| rfsm.raw_get("init")).map_err(failed)?;

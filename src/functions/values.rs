@@ -1,6 +1,7 @@
 //! Plain data to and from Lua.
 
-use mlua::{Lua, Result, Value};
+use crate::model::Value as Worth;
+use mlua::{Error, Lua, Result, Value};
 use serde_json::Value as Json;
 
 /// Levels of nesting that are followed.
@@ -60,5 +61,43 @@ pub fn to_json(value: &Value, level: usize, spend: &mut dyn FnMut() -> bool) -> 
             if fields.is_empty() { Json::Array(items) } else { Json::Object(fields) }
         }
         other => Json::String(other.to_string()?),
+    })
+}
+
+/// A value of the model; a number that is not finite stays one.
+///
+/// # Errors
+/// When Lua has no memory for it.
+pub fn of_value(lua: &Lua, value: &Worth) -> Result<Value> {
+    Ok(match value {
+        Worth::Bool(b) => Value::Boolean(*b),
+        Worth::Int(i) => Value::Integer(*i),
+        Worth::Float(n) => Value::Number(*n),
+        Worth::Str(text) => Value::String(lua.create_string(&**text)?),
+        Worth::Array(elements) => {
+            let table = lua.create_table_with_capacity(elements.len(), 0)?;
+            elements.iter().try_for_each(|element| table.push(of_value(lua, element)?))?;
+            Value::Table(table)
+        }
+        Worth::Record(fields) => {
+            let table = lua.create_table_with_capacity(0, fields.len())?;
+            fields.iter().try_for_each(|(name, value)| table.set(name.as_str(), of_value(lua, value)?))?;
+            Value::Table(table)
+        }
+    })
+}
+
+/// A number, a text, a list of them or the like as a value of the model.
+///
+/// # Errors
+/// It is none (a function, nil).
+pub fn to_value(value: &Value) -> Result<Worth> {
+    Ok(match value {
+        Value::Boolean(b) => Worth::Bool(*b),
+        Value::Integer(i) => Worth::Int(*i),
+        Value::Number(n) => Worth::Float(*n),
+        Value::String(text) => Worth::str(&text.to_str()?),
+        Value::Table(table) => Worth::Array(table.sequence_values().map(|v| to_value(&v?)).collect::<Result<_>>()?),
+        other => return Err(Error::runtime(format!("a {} is no value of a parameter", other.type_name()))),
     })
 }

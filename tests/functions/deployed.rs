@@ -66,10 +66,19 @@ pub fn said_by(coordinator: &str, seconds: u64) -> Vec<String> {
 
 /// The same; `look` sees the session before it is taken down.
 fn watched(coordinator: &str, seconds: u64, look: impl FnOnce(&Arc<davit::session::Session>)) -> Vec<String> {
+    watched_by(&davit::runtime::Libraries::new().into(), coordinator, seconds, look)
+}
+
+/// The same in a program with its own extensions.
+fn watched_by(
+    program: &app::Extensions,
+    coordinator: &str,
+    seconds: u64,
+    look: impl FnOnce(&Arc<davit::session::Session>),
+) -> Vec<String> {
     let files = [("d.yaml", DEPLOYMENT), ("configurations.lua", CONFIGURATIONS), ("coordinator.lua", coordinator)];
     let folder = folder(&files);
-    let libraries = davit::runtime::Libraries::new();
-    let read = app::read(&folder.path().join("d.yaml"), &LoadOptions::default(), &libraries).unwrap();
+    let read = app::read(&folder.path().join("d.yaml"), &LoadOptions::default(), program).unwrap();
     let checked = app::check(read).unwrap_or_else(|refused| panic!("{:?}", refused.findings));
     let clock = Clock::simulated();
     let _me = clock.enter();
@@ -244,4 +253,54 @@ fn names_from_outside_that_only_functions_may_see_are_bounded() {
         assert!(told.message.contains("each is kept for ever"), "{told:?}");
     });
     assert!(!said.is_empty());
+}
+
+/// `operational` asks a function of the program, well and badly.
+const ASKING: &str = r#"
+return rfsm.state {
+  idle = rfsm.state {},
+  starting = rfsm.state { entry = 'make' },
+  operational = rfsm.state { entry = function() print(gauge('g', { 1, 2.5 })) print(pcall(gauge)) gauge(print) end },
+  stopping = rfsm.state { entry = 'make.undo' },
+  fault = rfsm.state {},
+  rfsm.trans { src = 'initial', tgt = 'idle' },
+  rfsm.trans { src = 'idle', tgt = 'starting', events = { 'e_start' } },
+  rfsm.trans { src = 'starting', tgt = 'operational', events = { 'make.ok' } },
+  rfsm.trans { src = 'starting', tgt = 'fault', events = { 'make.failed', 'make.broken' } },
+  rfsm.trans { src = 'fault', tgt = 'idle', events = { 'e_stop' } },
+  rfsm.trans { src = 'operational', tgt = 'stopping', events = { 'e_stop' } },
+  rfsm.trans { src = 'stopping', tgt = 'idle', events = { 'make.undone' } },
+  rfsm.trans { src = 'stopping', tgt = 'fault', events = { 'make.undo.failed', 'make.undo.broken' } },
+}
+"#;
+
+#[test]
+fn functions_of_a_platform_are_waited_for_and_their_errors_are_luas() {
+    use davit::model::{PlatformKind, Value};
+    let asked: Arc<Mutex<Vec<Vec<Value>>>> = Arc::default();
+    let heard = asked.clone();
+    let own = app::PlatformMaker::new("simulated", PlatformKind::SIMULATED, |_| Err("it is given".to_owned()));
+    let own = own.function("gauge", move |platform, clock, values| {
+        clock.sleep(Duration::from_secs(1));
+        heard.lock().unwrap().push(values.to_vec());
+        let there = platform.observe(clock.now() + Duration::from_secs(1)).map_err(|why| why.to_string())?;
+        if values.is_empty() {
+            Err("which one?".to_owned())
+        } else {
+            Ok(there.components.len().to_string().as_str().into())
+        }
+    });
+    let program = app::Extensions::from(davit::runtime::Libraries::new()).with_platform(own);
+    let said = watched_by(&program, ASKING, 5, |_| {});
+    let list = Value::Array(vec![Value::Int(1), Value::Float(2.5)]);
+    assert_eq!(*asked.lock().unwrap(), [vec![Value::str("g"), list], vec![]], "what is no value is not handed on");
+    assert_eq!(said[0], "info: 1", "{said:?}");
+    assert!(said[1].starts_with("info: false") && said[1].contains("which one?"), "{said:?}");
+    assert!(said[2].starts_with("err: ") && said[2].contains("a function is no value"), "{said:?}");
+}
+
+#[test]
+fn built_in_platforms_have_no_functions() {
+    let said = said_by(ASKING, 5);
+    assert!(said.len() == 1 && said[0].contains("global 'gauge'"), "{said:?}");
 }

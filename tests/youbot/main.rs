@@ -1,5 +1,6 @@
 //! The youBot reference application, measured in simulated time.
 
+mod before;
 mod bench;
 mod chatter;
 mod composed;
@@ -20,6 +21,7 @@ mod motion;
 mod passive;
 mod robot;
 mod scenarios;
+mod stability;
 mod stops;
 mod two;
 mod variants;

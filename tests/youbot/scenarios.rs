@@ -8,10 +8,11 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Each with what is set for it here: what takes a minute in the file is shorter.
-const SCENARIOS: [(&str, &[(&str, &str)]); 14] = [
+const SCENARIOS: [(&str, &[(&str, &str)]); 18] = [
     ("bring_up", &[]),
     ("crash", &[]),
     ("driver", &[]),
+    ("energy", &[]),
     ("engaged_in_motion", &[]),
     ("estop", &[]),
     ("hang", &[]),
@@ -20,6 +21,9 @@ const SCENARIOS: [(&str, &[(&str, &str)]); 14] = [
     ("one_stops", &[]),
     ("peer_restart", &[]),
     ("push", &[]),
+    ("refused", &[]),
+    ("repair", &[]),
+    ("saturated", &[]),
     ("shutdown_while_copying", &[]),
     ("tracking", &[("seconds", "20")]),
     ("udp", &[]),
@@ -78,6 +82,11 @@ fn driver() {
 }
 
 #[test]
+fn energy() {
+    run("energy");
+}
+
+#[test]
 fn engaged_in_motion() {
     run("engaged_in_motion");
 }
@@ -115,6 +124,21 @@ fn peer_restart() {
 #[test]
 fn push() {
     run("push");
+}
+
+#[test]
+fn refused() {
+    run("refused");
+}
+
+#[test]
+fn repair() {
+    run("repair");
+}
+
+#[test]
+fn saturated() {
+    run("saturated");
 }
 
 #[test]

@@ -77,6 +77,7 @@ pub struct Driver {
     motor_states: Out<MotorStates>,
     driver_state: Out<DriverState>,
     control_mode: Out<u8>,
+    tau_sat: Out<u8>,
     plant_command: Out<PlantCommand>,
     events: EventOut,
     tau_max: Prop<J5>,
@@ -236,6 +237,7 @@ impl Component for Driver {
             motor_states: b.doc("How the motors are.").output("motor_states"),
             driver_state: b.doc("How the field bus is.").output("driver_state"),
             control_mode: b.doc("What the drives do: 0, 1 or 6.").output("control_mode"),
+            tau_sat: b.doc("Bit i: joint i+1 takes torques, and its drive gives all that it has.").output("tau_sat"),
             plant_command: b.doc("What is done to arm and base.").output("plant_command"),
             events: b.doc("Limits, watchdogs, errors.").event_output("events"),
             tau_max: b
@@ -367,6 +369,10 @@ impl Component for Driver {
                 HeatChange::Exit => self.events.raise(self.names.cooled),
             }
         }
+        let most = self.drives.parameters.tau_max;
+        let full = |joint: &usize| driven.torque[*joint].abs() >= most[*joint];
+        let full = (0..JOINTS).filter(full).fold(0, |mask, joint| mask | 1 << joint);
+        self.tau_sat.write(if self.drives.mode() == DriveMode::Torque { full } else { 0 });
         let lost = aged(&mut self.watched, cx).is_some_and(|(_, age)| age > UNWATCHED);
         let lost = lost && self.drives.mode() == DriveMode::Torque;
         self.unwatched = self.again(lost, self.unwatched, cx.dt(), |c| c.events.raise(c.names.unwatched));
