@@ -115,6 +115,10 @@ impl Diff {
                 }
             }
         }
+        // One that has failed gives back what others may need.
+        if node.state == RunState::Faulted && target.state != RunState::Faulted && !node.ty.exclusive.is_empty() {
+            to_go(Wanted::Unconfigured);
+        }
         // A component that only has to go down goes down here, with the others that do.
         let wanted = to_want(target.state);
         if node.state != target.state && node.state != RunState::Faulted && RunState::from(wanted) < state {

@@ -10,6 +10,7 @@ mod node;
 mod overlay;
 mod picture;
 mod place;
+mod reversibility;
 mod so;
 pub mod step;
 mod system_graph;

@@ -3,6 +3,7 @@
 //! The three stand together, one kind of step after the other, because each is the other two's specification (semantics: *Steps and plans*).
 //! What it touches stands beside them, in [`touch`](super::touch).
 
+pub use super::reversibility::Reversibility;
 pub use super::touch::{absolute, components, touch_each, touches};
 use super::violation::brief;
 use super::{ComponentNode, Driven, MemberClass, View, ViewMut, Violation, exclusive};
@@ -33,18 +34,6 @@ impl Undo {
             Self::Nothing | Self::Irreversible(_) => &[],
         }
     }
-}
-
-/// How far a step can be undone.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Reversibility {
-    /// Its inverse restores the observable state.
-    Exact,
-    /// Another call makes good for it.
-    Compensated,
-    /// Nothing undoes it.
-    Irreversible,
 }
 
 /// Every false precondition of `step` in `view`; empty: it may happen.

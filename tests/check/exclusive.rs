@@ -55,7 +55,7 @@ fn one_after_the_other_they_may() {
         .iter()
         .map(|change| {
             if change.2.contains("'left/down'") {
-                (change.0, change.1, "trans { src = 'one', tgt = 'two', events = { 'left/e_leaving' } }")
+                (change.0, change.1, "trans { src = 'one', tgt = 'two', events = { 'left/stranded' } }")
             } else {
                 *change
             }

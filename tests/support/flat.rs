@@ -57,6 +57,10 @@ impl Renamed<'_> {
         if COMPONENTS.contains(&first) && !is_type {
             return format!("{robot}{first}{}", rest.replace(".is_", &format!(".is_{robot}")));
         }
+        // Each has a bus of its own.
+        if text == "sim0" {
+            return format!("{robot}{text}");
+        }
         if self.configurations.iter().any(|id| id == first) || text == "profile" {
             return format!("{robot}{text}");
         }

@@ -93,7 +93,7 @@ pub static TYPE: Object = Object {
             "What a component needs for itself, by name, `{property}` being the value of one of its properties that is `tunable: unconfigured`. It holds that from \
              *configured* on until it is *unconfigured* again, one component at a time, in all of a deployment: a second one is refused.",
             "exclusive: [can0]",
-            ("exclusive: [\"can{\"]", TEXT_BAD_VALUE),
+            ("exclusive: 1", TEXT_WRONG_TYPE),
         ),
     ],
 };
