@@ -4,7 +4,6 @@ use super::judge::created;
 use super::members::Member;
 use super::product::Product;
 use super::state::{Answers, Failed, Move, Next, Nexts, ProductState, Trouble, bit, index};
-use crate::limits;
 use crate::model::{Ask, ConfigId, EventName, RequestId, Verdict};
 use crate::stack::{Batch, FrameId, Request, Requester, Why};
 use crate::statechart::{EdgeId, EventId};

@@ -92,12 +92,39 @@ pub fn of_value(lua: &Lua, value: &Worth) -> Result<Value> {
 /// # Errors
 /// It is none (a function, nil).
 pub fn to_value(value: &Value) -> Result<Worth> {
+    nested(value, 0)
+}
+
+/// Lists in lists are read so deep: a table may hold itself.
+const DEEPEST: usize = 8;
+
+fn nested(value: &Value, depth: usize) -> Result<Worth> {
+    if depth > DEEPEST {
+        return Err(Error::runtime(format!("a list more than {DEEPEST} deep is no value of a parameter")));
+    }
     Ok(match value {
         Value::Boolean(b) => Worth::Bool(*b),
         Value::Integer(i) => Worth::Int(*i),
         Value::Number(n) => Worth::Float(*n),
         Value::String(text) => Worth::str(&text.to_str()?),
-        Value::Table(table) => Worth::Array(table.sequence_values().map(|v| to_value(&v?)).collect::<Result<_>>()?),
+        Value::Table(table) => {
+            Worth::Array(table.sequence_values().map(|v| nested(&v?, depth + 1)).collect::<Result<_>>()?)
+        }
         other => return Err(Error::runtime(format!("a {} is no value of a parameter", other.type_name()))),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_list_that_holds_itself_is_no_value() {
+        let lua = Lua::new();
+        let list: Value = lua.load("local t = {} t[1] = t return t").eval().unwrap();
+        assert!(to_value(&list).unwrap_err().to_string().contains("more than 8 deep"));
+        let list: Value = lua.load("return { { 1, 2 }, { 3 } }").eval().unwrap();
+        let inner = |numbers: &[i64]| Worth::Array(numbers.iter().map(|n| Worth::Int(*n)).collect());
+        assert_eq!(to_value(&list).unwrap(), Worth::Array(vec![inner(&[1, 2]), inner(&[3])]));
+    }
 }
