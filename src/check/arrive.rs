@@ -354,7 +354,7 @@ impl Product<'_> {
     }
 
     /// So many events are on their way at once: two for each where there are many coordinators, for one event may be for all of them.
-    pub(super) fn most_between(&self) -> usize {
+    fn most_between(&self) -> usize {
         limits::CHECK_INBOX.max(2 * self.members.len())
     }
 

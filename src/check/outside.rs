@@ -4,6 +4,7 @@ use super::judge::created;
 use super::members::Member;
 use super::product::Product;
 use super::state::{Answers, Failed, Move, Next, Nexts, ProductState, Trouble, bit, index};
+use crate::limits;
 use crate::model::{Ask, ConfigId, EventName, RequestId, Verdict};
 use crate::stack::{Batch, FrameId, Request, Requester, Why};
 use crate::statechart::{EdgeId, EventId};
@@ -58,7 +59,7 @@ impl Product<'_> {
         if state.across {
             return;
         }
-        if state.inbox.len() + self.members.len() > self.most_between() {
+        if state.inbox.len() + self.members.len() > limits::CHECK_INBOX {
             self.overflow = true;
             return;
         }

@@ -449,7 +449,7 @@ fn what_an_operator_put_on_a_subsystem_goes_when_that_is_led_down_alone() {
         "deploy('pair.yaml')
          set('left/Drive.gain', 1.5, { force = true, within = 1 })
          set('right/Drive.gain', 1.5, { force = true, within = 1 })
-         raise('left/e_shutdown')
+         raise('left/Drive.faulted')
          wait_answer('left/make.undone', 5)
          wait_state('pair:idle', 5)
          shutdown()",

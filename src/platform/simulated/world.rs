@@ -7,7 +7,7 @@ use crate::model::finding::{are, count};
 use crate::model::value::FitError;
 use crate::model::{
     Catalogue, ComponentName, ComponentSnapshot, ComponentType, Direction, Ident, MemberRef, Policy, PortType,
-    RunState, Snapshot, Step, Value, ValueType,
+    RunState, Snapshot, Step, Transition, Value, ValueType,
 };
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -70,10 +70,12 @@ impl SimulatedWorld {
         match step {
             Step::State { component, transition } => {
                 let state = self.component(*component)?.state;
-                if transition.allowed_in(state) {
-                    Ok(())
-                } else {
-                    Err(format!("`{component}` is {state}: it cannot {transition}"))
+                if !transition.allowed_in(state) {
+                    return Err(format!("`{component}` is {state}: it cannot {transition}"));
+                }
+                match self.holder(*component).filter(|_| *transition == Transition::Configure) {
+                    Some(by) => Err(format!("`{component}` needs what `{by}` holds")),
+                    None => Ok(()),
                 }
             }
             Step::Create { component, ty, activity, properties } => {
@@ -133,6 +135,20 @@ impl SimulatedWorld {
                 call.args.iter().zip(&ty.args).try_for_each(|(value, ty)| exactly(value, ty))
             }
         }
+    }
+
+    /// Who holds something that a component needs for itself.
+    fn holder(&self, component: ComponentName) -> Option<ComponentName> {
+        let needs = |it: &SimulatedComponent| -> Vec<String> {
+            it.ty.exclusive.iter().filter_map(|thing| thing.named(|property| it.properties.get(&property))).collect()
+        };
+        let own = self.components.get(&component).map(needs).filter(|own| !own.is_empty())?;
+        let holds = |(name, it): &(&ComponentName, &SimulatedComponent)| {
+            **name != component
+                && it.state != RunState::Unconfigured
+                && needs(it).iter().any(|thing| own.contains(thing))
+        };
+        self.components.iter().find(holds).map(|(name, _)| *name)
     }
 
     fn check_create(
