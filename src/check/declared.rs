@@ -5,7 +5,7 @@ use super::monitors;
 use super::universe::Universe;
 use crate::model::codes::{
     CONF_HOLDS_UNSEEN, DEPLOY_NO_REST, DEPLOY_ONE_EVENT, DEPLOY_SAFETY_ANSWER, DEPLOY_UNKNOWN_CONFIGURATION,
-    NOT_AN_IN_PORT, TYPE_SETTLED_ELSEWHERE, UNKNOWN_PROPERTY,
+    NOT_AN_IN_PORT, TYPE_EXCLUSIVE, TYPE_SETTLED_ELSEWHERE, UNKNOWN_PROPERTY,
 };
 use crate::model::finding::did_you_mean;
 use crate::model::monitor::{Condition, ConditionKind, SELF, SignalKind};
@@ -129,6 +129,18 @@ fn settable(universe: &Universe, member: MemberRef, at: Origin) -> Option<Findin
         return Some(universe.unknown(member.component, at));
     }
     let types: Vec<&ComponentType> = creations.iter().filter_map(|c| c.description.as_deref()).collect();
+    let names = |ty: &ComponentType| {
+        ty.exclusive.iter().find(|thing| thing.properties().any(|name| name == member.member)).map(ToString::to_string)
+    };
+    // Whatever value is chosen may be that of another component.
+    if let Some(thing) = types.iter().find_map(|ty| names(ty)) {
+        let message = format!(
+            "`{member}` says which `{thing}` `{}` has for itself: an operator could name one that is held",
+            member.component
+        );
+        let help = "give it where the component is created; with `--force` an operator sets it all the same";
+        return Some(Finding::error(TYPE_EXCLUSIVE, message).at(at).help(help));
+    }
     let is_in = |ty: &ComponentType| ty.port(member.member).is_some_and(|port| port.direction == Direction::In);
     let fits = |ty: &&ComponentType| ty.properties.contains_key(&member.member) || is_in(ty);
     // That a type is unknown is said where it is created.

@@ -260,9 +260,10 @@ codes! {
     TYPE_CIRCLE = "type::circle", "the order of types leads round in a circle",
         "`start_after` and `stop_before` say which types come first inside a feedback loop, where the data flow does not. Each of these \
          waits for another one of them, so no order fits, and the name would decide. Leave one of the names out.";
-    TYPE_EXCLUSIVE = "type::exclusive", "`exclusive` names a thing by a property that cannot stand in its name",
+    TYPE_EXCLUSIVE = "type::exclusive", "a property that cannot stand in the name of what a component has for itself",
         "What a component holds for itself must not become something else while it holds it: a property in braces is one of the type, of type string, int \
-         or bool, and `tunable: unconfigured`. Mark the property so, or name the thing without it.";
+         or bool, and `tunable: unconfigured`. Mark the property so, or name the thing without it. Nor may an operator choose it without force (`operator:`): any value \
+         may be that of another component.";
     TYPE_WITHOUT_CODE = "type::without_code", "a component of a type that is only declared, on a platform that needs its code",
         "Types under `types:` say which ports, properties and operations a component has, not what it does. The simulated \
          platform runs them all the same; the embedded platform needs the code, which comes with a library. Use \

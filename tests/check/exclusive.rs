@@ -99,6 +99,14 @@ fn a_parent_holds_nothing_that_a_subsystem_may_need() {
 }
 
 #[test]
+fn an_operator_does_not_choose_what_is_held() {
+    let operated: Vec<Change> =
+        BUS.into_iter().chain([OTHER_BUS, ("arm.yaml", "accepts:", "operator: [D.bus, D.k]\naccepts:")]).collect();
+    let says = one(&operated, "type::exclusive").0;
+    assert!(says.starts_with("`D.bus` says which `can:{bus}` `D` has for itself"), "{says}");
+}
+
+#[test]
 fn a_second_holder_is_refused_where_it_would_be_configured() {
     let second = |what: &'static str| {
         let run: &'static str = format!("run = Configuration {{ {what} }},").leak();
