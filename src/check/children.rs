@@ -1,8 +1,10 @@
 //! Subsystems as those know them who follow their parent, and as a state has them.
 
+use super::reactions::{Macrostep, Reactions};
 use super::state::ProductState;
-use crate::model::{ConfigId, Configuration, Deployment, EventName, Ident, Subsystem, SubsystemStanding};
-use crate::stack::claims;
+use crate::model::{Ask, ConfigId, Configuration, Deployment, EventName, Ident, Subsystem, SubsystemStanding};
+use crate::stack::{Requester, claims};
+use crate::statechart::{Chart, compile};
 use rustc_hash::FxHashSet;
 use std::collections::BTreeSet;
 
@@ -23,6 +25,8 @@ pub struct Child {
     pub touching: FxHashSet<ConfigId>,
     /// What it may hold for itself.
     pub holds: BTreeSet<String>,
+    /// It may do so though nobody has begun it.
+    pub unbidden: bool,
 }
 
 /// Of so many subsystems of one file it is known how they stand.
@@ -41,8 +45,8 @@ impl Child {
             };
             let touching = deployment.configurations.iter().filter(touches).map(|c| c.id).collect();
             let (begins, down) = (own.deploy.event.within(path), SubsystemStanding::Down.event(path));
-            let holds = subsystem.holds.clone();
-            Self { path, begins, from, up: SubsystemStanding::Up.event(path), until, down, touching, holds }
+            let (holds, unbidden) = (subsystem.holds.clone(), !subsystem.holds.is_empty() && is_unbidden(subsystem));
+            Self { path, begins, from, up: SubsystemStanding::Up.event(path), until, down, touching, holds, unbidden }
         };
         deployment.subsystems.iter().take(MOST_CHILDREN).map(of).collect()
     }
@@ -54,6 +58,35 @@ pub fn begun(at: usize) -> u64 {
 
 pub fn promised(at: usize) -> u64 {
     1 << (at + MOST_CHILDREN)
+}
+
+/// One was begun anew before it was heard to be down: what is heard then may be of the life before.
+pub const DOUBT: u64 = 1 << 63;
+
+/// Whether a subsystem, or one inside it, goes somewhere from where it is down by anything but the event that begins it, or an operator may
+/// apply something there.
+fn is_unbidden(subsystem: &Subsystem) -> bool {
+    let own = &*subsystem.own;
+    let wakes = |chart: &Chart| {
+        let begins = chart.event(own.deploy.event);
+        let mut reactions = Reactions::new(own, chart, &[], Requester::Operator, None);
+        let Some(first) = reactions.enter() else { return true };
+        let applies = |step: &Macrostep| {
+            let mut asked = step.handed.iter().flat_map(|batch| &batch.requests);
+            asked.any(|request| matches!(request.ask, Ask::Apply(_)))
+        };
+        let mut events: Vec<_> = chart.events().iter().map(|event| chart.event(*event)).collect();
+        events.extend(reactions.offers(first.leaf).iter());
+        let mut others = events.into_iter().filter(|event| *event != begins);
+        applies(&first)
+            || others.any(|event| {
+                let step = reactions.react(first.leaf, event);
+                step.leaf != first.leaf || applies(&step)
+            })
+    };
+    own.operator_applies().next().is_some()
+        || own.own_part().charts().filter_map(|chart| compile(chart).0).any(|chart| wakes(&chart))
+        || own.subsystems.iter().any(is_unbidden)
 }
 
 /// The parent has let it go, and it was not down since.

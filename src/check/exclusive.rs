@@ -1,7 +1,7 @@
 //! What subsystems hold for themselves: no two that may hold the same thing are begun at once, and none together with a component of
 //! the parent's own that holds it. Inside one file the planner refuses that.
 
-use super::children::begun;
+use super::children::{DOUBT, begun};
 use super::explore::Graph;
 use super::judge::{Traced, severity_of};
 use super::product::Product;
@@ -21,7 +21,7 @@ enum Rival {
 impl Product<'_> {
     /// A subsystem that is begun, who else may hold something that it may hold, and what.
     fn contended(&self, state: &ProductState) -> Option<(usize, Rival, String)> {
-        let there = |at: usize| state.children & begun(at) != 0;
+        let there = |at: usize| state.children & (begun(at) | DOUBT) != 0 || self.children[at].unbidden;
         for (at, child) in self.children.iter().enumerate().filter(|(at, child)| there(*at) && !child.holds.is_empty())
         {
             for (other, rival) in self.children.iter().enumerate().skip(at + 1).filter(|(other, _)| there(*other)) {

@@ -2,7 +2,7 @@
 //! to it here: it asks for what touches it only then, and holds no frame of it any more when the promise ends. The file of the subsystem
 //! is in [`exports`](super::exports).
 
-use super::children::{Child, begun, promised, released};
+use super::children::{Child, DOUBT, begun, promised, released};
 use super::explore::Graph;
 use super::judge::{Traced, severity_of};
 use super::product::Product;
@@ -35,6 +35,9 @@ impl Product<'_> {
     pub(super) fn tells_child(&self, state: &mut ProductState, name: EventName) {
         for (at, child) in self.children.iter().enumerate() {
             if name == child.begins {
+                if state.children & begun(at) != 0 && !child.holds.is_empty() {
+                    state.children |= DOUBT;
+                }
                 state.children |= begun(at);
             } else if name == child.until {
                 state.children &= !promised(at);

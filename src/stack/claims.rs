@@ -158,19 +158,21 @@ impl Claims {
             Ask::Apply(id) | Ask::UndoOf(id) => is_of_system(safe, id),
             Ask::Undo | Ask::UndoTo(_) | Ask::Commit { .. } => true,
         };
-        path.is_empty() || requests.clone().into_iter().any(belongs) || {
-            let mut inside = Claim::default();
-            let names = self.numbers.iter().filter(|(name, _)| is_in_system(safe, **name));
-            names.for_each(|(_, at)| inside.set(*at));
-            inside.meets(&self.of(requests))
-        }
+        path.is_empty() || requests.clone().into_iter().any(belongs) || self.inside(path).meets(&self.of(requests))
     }
 
     /// What is led down.
     pub fn of_led(&self, led: LedDown) -> Claim {
-        let LedDown::Inside(path) = led else { return Claim::all() };
+        match led {
+            LedDown::Whole => Claim::all(),
+            LedDown::Inside(path) => self.inside(path.as_str()),
+        }
+    }
+
+    /// All components of the subsystem of a path.
+    fn inside(&self, path: &str) -> Claim {
         let mut inside = Claim::default();
-        let names = self.numbers.iter().filter(|(name, _)| is_within(name.prefix(), path.as_str()));
+        let names = self.numbers.iter().filter(|(name, _)| is_within(name.prefix(), path));
         names.for_each(|(_, at)| inside.set(*at));
         inside
     }

@@ -33,9 +33,8 @@ fn two_subsystems_have_not_the_same_thing_at_once() {
     assert!(held(&apart).is_empty(), "{:#?}", found(&apart));
 }
 
-#[test]
-fn one_after_the_other_they_may() {
-    // `right` is begun when `left` is down, and only then.
+/// `right` is begun when `left` is down, and only then.
+fn in_turns() -> Vec<Change> {
     let turns = [
         ("pair_conf.lua", "connect('left.pose', 'right.ref'), connect('right.pose', 'left.ref')", ""),
         (
@@ -48,7 +47,12 @@ fn one_after_the_other_they_may() {
         ("pair.lua", "trans { src = 'one', tgt = 'coupling', events = { 'right/up' } },", ""),
         ("pair.lua", "src = 'two', tgt = 'coupling', events = { 'left/up' }", "src = 'two', tgt = 'coupling', events = { 'right/up' }"),
     ];
-    let turns: Vec<Change> = BUS.into_iter().chain(turns).collect();
+    BUS.into_iter().chain(turns).collect()
+}
+
+#[test]
+fn one_after_the_other_they_may() {
+    let turns = in_turns();
     assert!(held(&turns).is_empty(), "{:#?}", held(&turns));
     // And without waiting for that they may not.
     let early: Vec<Change> = turns
@@ -62,6 +66,38 @@ fn one_after_the_other_they_may() {
         })
         .collect();
     assert_eq!(held(&early).len(), 1);
+}
+
+#[test]
+fn what_comes_up_unbidden_may_be_there_at_any_time() {
+    let unbidden = [
+        ("arm.yaml", "accepts: [e_released]", "accepts: [e_released, e_again]"),
+        ("arm.lua", "tgt = 'making', events = { 'e_start' }", "tgt = 'making', events = { 'e_start', 'e_again' }"),
+    ];
+    let by_event: Vec<Change> = in_turns().into_iter().chain(unbidden).collect();
+    assert_eq!(held(&by_event).len(), 1, "{:#?}", found(&by_event));
+    let operated: Vec<Change> =
+        in_turns().into_iter().chain([("arm.yaml", "accepts:", "operator: [run]\naccepts:")]).collect();
+    assert_eq!(held(&operated).len(), 1, "{:#?}", found(&operated));
+}
+
+#[test]
+fn that_one_is_down_may_have_been_told_before_it_was_begun_anew() {
+    let anew = [
+        (
+            "pair.lua",
+            "trans { src = 'one', tgt = 'two', events = { 'left/down' } }",
+            "trans { src = 'one', tgt = 'anew', events = { 'left/stranded' } },
+             trans { src = 'anew', tgt = 'two', events = { 'left/down' } }",
+        ),
+        (
+            "pair.lua",
+            "two = state { entry = 'right/e_start' },",
+            "two = state { entry = 'right/e_start' }, anew = state { entry = 'left/e_start' },",
+        ),
+    ];
+    let anew: Vec<Change> = in_turns().into_iter().chain(anew).collect();
+    assert_eq!(held(&anew).len(), 1, "{:#?}", found(&anew));
 }
 
 #[test]
