@@ -1,6 +1,6 @@
 -- Both robots over sockets:  davit run examples/scenarios/udp.lua --clock simulated   (with `--clock real` as on two machines)
 
-deploy("../../deployments/youbot_udp.yaml")
+deploy("../udp/coupling.yaml")
 wait_state("left:copying", 20)
 wait_state("right:copying", 20)
 wait(8)                                 -- until the left hand leads

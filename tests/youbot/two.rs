@@ -64,6 +64,8 @@ impl Robot {
                 // Types of the library, which has the name of the driver.
                 "youbot" if rest.starts_with('.') && rest[1..].starts_with(char::is_uppercase) => word.to_owned(),
                 "profile" => format!("{}_profile", self.side),
+                // Each has a bus of its own.
+                "sim0" => format!("{}_sim0", self.side),
                 _ if own(name) => format!("{}/{word}", self.side),
                 _ => word.to_owned(),
             }

@@ -74,7 +74,14 @@ impl DatagramLink {
         let (own, other) = (address(bind, "bind")?, address(peer, "peer")?);
         let said = |what: &str, error: io::Error| format!("{what}: {error}");
         let socket = UdpSocket::bind(own).map_err(|error| said(&format!("cannot bind to {own}"), error))?;
+        if other.ip().is_unspecified() || other.port() == 0 {
+            return Err(format!("{other} is no address of one other end (peer)"));
+        }
         socket.connect(other).map_err(|error| said(&format!("cannot send to {other}"), error))?;
+        // One bound to every address of the machine is known by the one that leads there from now on.
+        if socket.local_addr().is_ok_and(|own| own == other) {
+            return Err(format!("{other} is its own address (peer): it would hear itself"));
+        }
         socket.set_nonblocking(true).map_err(|error| said("the socket cannot be asked without waiting", error))?;
         Ok(Self(socket))
     }
@@ -165,6 +172,12 @@ mod tests {
         assert_eq!(one.receive(), Some(Received::Refused));
         let error = DatagramLink::open(&left, &right).unwrap_err();
         assert!(error.starts_with(&format!("cannot bind to {left}: ")), "{error}");
+        let own = free();
+        for (bind, peer) in [(own.clone(), own.clone()), (own.replace("127.0.0.1", "0.0.0.0"), own.clone())] {
+            assert!(DatagramLink::open(&bind, &peer).unwrap_err().ends_with("it would hear itself"), "{bind} {peer}");
+        }
+        let error = DatagramLink::open(&own, &own.replace("127.0.0.1", "0.0.0.0")).unwrap_err();
+        assert!(error.ends_with("is no address of one other end (peer)"), "{error}");
         assert!(DatagramLink::open("here", &right).unwrap_err().contains("`here` is no address (bind)"));
     }
 }
