@@ -54,6 +54,12 @@ fn unasked(own: &Deployment, subsystem: &Subsystem, charts: &[&Chart]) -> Option
             let has = |event| step.emitted.contains(&event);
             !has(ends) && (has(begins) || before)
         };
+        // In one step what is raised first comes first.
+        let lets_go = |before: bool, step: &Macrostep| {
+            let at = |event| step.emitted.iter().position(|raised| *raised == event);
+            let early = before || at(begins).is_some();
+            at(until).is_some_and(|until| early && at(ends).is_none_or(|ends| until < ends))
+        };
         let start = (first.leaf, after(false, &first));
         let (mut all, mut met) = (vec![start], FxHashSet::from_iter([start]));
         let events: Vec<EventId> = chart.events().iter().map(|event| chart.event(*event)).collect();
@@ -66,7 +72,7 @@ fn unasked(own: &Deployment, subsystem: &Subsystem, charts: &[&Chart]) -> Option
                 let heard = early && !told;
                 let step = reactions.react(leaf, event);
                 let next = (step.leaf, after(heard, &step));
-                if next.1 && step.emitted.contains(&until) {
+                if lets_go(heard, &step) {
                     return true;
                 }
                 if met.insert(next) {

@@ -2,7 +2,7 @@
 //! same time (semantics: *Requests*).
 
 use super::contenders::{contenders, may_hold};
-use super::request::{LedDown, Request};
+use super::request::{LedDown, Request, Requester};
 use crate::model::names::is_within;
 use crate::model::{Ask, Catalogue, ChangeKind, ComponentName, ConfigId, Configuration, Ident, Target};
 use rustc_hash::FxHashMap;
@@ -156,7 +156,9 @@ impl Claims {
         let path = safe.prefix();
         let belongs = |request: &Request| match request.ask {
             Ask::Apply(id) | Ask::UndoOf(id) => is_of_system(safe, id),
-            Ask::Undo | Ask::UndoTo(_) | Ask::Commit { .. } => true,
+            // What it claims says the rest.
+            Ask::Undo => !matches!(request.requester, Requester::Coordinator(name) if !is_within(name.as_str(), path)),
+            Ask::UndoTo(_) | Ask::Commit { .. } => true,
         };
         path.is_empty() || requests.clone().into_iter().any(belongs) || self.inside(path).meets(&self.of(requests))
     }
@@ -166,6 +168,19 @@ impl Claims {
         match led {
             LedDown::Whole => Claim::all(),
             LedDown::Inside(path) => self.inside(path.as_str()),
+        }
+    }
+
+    /// What a requester's file, and those of its subsystems, are about.
+    fn of_file(&self, requester: Requester) -> Claim {
+        let Requester::Coordinator(name) = requester else { return Claim::all() };
+        let name = name.as_str();
+        let is_path = self.numbers.keys().any(|component| is_within(component.prefix(), name));
+        match name.rsplit_once('/') {
+            // A coordinator without a name of its own is called like its subsystem.
+            _ if is_path => self.inside(name),
+            Some((path, _)) => self.inside(path),
+            None => Claim::all(),
         }
     }
 
@@ -187,8 +202,9 @@ impl Claims {
                         claim.join(own);
                     }
                 }
-                // Whose frame is the newest is not known from the text.
-                Ask::Undo | Ask::UndoTo(_) | Ask::Commit { .. } => claim.all = true,
+                // Which frame is the newest is not known from the text. That a coordinator is down is asked like this, too.
+                Ask::Undo => claim.join(&self.of_file(request.requester)),
+                Ask::UndoTo(_) | Ask::Commit { .. } => claim.all = true,
             }
         }
         claim
@@ -228,7 +244,6 @@ pub fn components(configuration: &Configuration) -> std::collections::BTreeSet<C
 mod tests {
     use super::*;
     use crate::model::{Change, Origin, Policy, RequestId, TypeName, Value};
-    use crate::stack::Requester;
 
     #[test]
     fn what_is_replaced_claims_what_it_may_be_connected_to() {
@@ -257,5 +272,32 @@ mod tests {
         let claims = Claims::new(all.iter(), &Catalogue::new());
         let of = |n: usize| claims.of([&Request::new(RequestId(0), Ask::Apply(all[n].id), Requester::Operator)]);
         assert!(of(1).meets(&of(2)) && of(1).meets(&of(0)) && !of(1).meets(&of(3)));
+    }
+
+    #[test]
+    fn what_is_asked_of_a_file_claims_that_file() {
+        let set = |of: &str| Configuration {
+            changes: vec![Change {
+                kind: ChangeKind::PropertySet {
+                    property: ComponentName::new(of).unwrap().member(Ident::new("k").unwrap()),
+                    value: Value::Int(1),
+                },
+                origin: Origin::NONE,
+            }],
+            ..Configuration::new(ConfigId::new(&format!("{}x", of.trim_end_matches('D'))).unwrap())
+        };
+        let all = [set("D"), set("left/D"), set("left/in/D"), set("right/D")];
+        let claims = Claims::new(all.iter(), &Catalogue::new());
+        let by = |name: &str| Requester::Coordinator(ComponentName::new(name).unwrap());
+        let meets = |name: &str, n: usize| {
+            let undo = Request::new(RequestId(0), Ask::Undo, by(name));
+            let apply = Request::new(RequestId(1), Ask::Apply(all[n].id), Requester::Operator);
+            claims.of([&undo]).meets(&claims.of([&apply]))
+        };
+        let of = |name: &str| (0..4).map(|n| meets(name, n)).collect::<Vec<_>>();
+        assert_eq!(of("pair"), [true, true, true, true]);
+        assert_eq!(of("left"), [false, true, true, false]);
+        assert_eq!(of("left/arm"), [false, true, true, false]);
+        assert_eq!(of("left/in"), [false, false, true, false]);
     }
 }

@@ -190,6 +190,12 @@ fn to_let_go_what_has_not_asked_for_it_is_too_early() {
         says.len() == 1 && says[0].contains("has not said `left/e_leaving`, and `left/e_shutdown` was not"),
         "{says:?}"
     );
+    // Nor before the event that ends it, in the same step.
+    let (before, after) = (
+        "'left/e_shutdown', 'right/e_shutdown', 'left/e_released', 'right/e_released'",
+        "'left/e_released', 'left/e_shutdown', 'right/e_shutdown', 'right/e_released'",
+    );
+    assert_eq!(early(&[("pair.lua", before, after)]).len(), 1);
     // When it was heard that it wants to leave it is not.
     let asked = [
         (

@@ -457,3 +457,57 @@ fn what_an_operator_put_on_a_subsystem_goes_when_that_is_led_down_alone() {
     let ran = demo.run(&["run", "story.lua", "--clock", "simulated"]);
     assert_eq!(ran.code, 0, "{}{}", ran.out, ran.err);
 }
+
+/// A sibling that is busy does not keep a subsystem from being down, nor from telling it.
+#[test]
+fn that_a_subsystem_is_down_is_told_while_a_sibling_is_busy() {
+    let demo = cell();
+    demo.write(
+        "robot.yaml",
+        &example("robot.yaml").replace(
+            "    properties: { gain: { type: float, default: 1.0 } }",
+            "    properties: { gain: { type: float, default: 1.0 } }\n    operations: { home: { effect: none } }",
+        ),
+    );
+    demo.write(
+        "robot_configurations.lua",
+        &example("robot_configurations.lua").replacen(
+            "ConfiguratorConf {",
+            "ConfiguratorConf { home = Configuration { timeout = 9, operation_call('Drive.home') },",
+            1,
+        ),
+    );
+    demo.write(
+        "pair.yaml",
+        &example("pair.yaml")
+            .replace("coordinator: pair_coordinator.lua", "coordinators: { l: left.lua, r: right.lua }")
+            .replace("up: joined", "up: [l:on, r:on]")
+            .replace("down: idle", "down: [l:idle, r:idle]"),
+    );
+    for side in ["left", "right"] {
+        demo.write(
+            &format!("{side}.lua"),
+            &"return state { idle = state {}, raising = state { entry = 'SIDE/e_start' }, on = state {}, failed = state {},
+  lowering = state { entry = { 'SIDE/e_shutdown', 'SIDE/e_released' } },
+  trans { src = 'initial', tgt = 'idle' }, trans { src = 'idle', tgt = 'raising', events = { 'e_start' } },
+  trans { src = 'raising', tgt = 'on', events = { 'SIDE/up' } }, trans { src = 'raising', tgt = 'failed', events = { 'SIDE/failed' } },
+  trans { src = 'raising', tgt = 'lowering', events = { 'e_shutdown' } }, trans { src = 'failed', tgt = 'lowering', events = { 'e_shutdown' } },
+  trans { src = 'on', tgt = 'lowering', events = { 'e_shutdown', 'SIDE/e_leaving' } }, trans { src = 'lowering', tgt = 'idle', events = { 'SIDE/down' } } }"
+                .replace("SIDE", side),
+        );
+    }
+    demo.write(
+        "story.lua",
+        "deploy('pair.yaml')
+         fault('operation_call right/Drive.home', 'slow', 1, 7)
+         apply('right/home', { force = true })
+         wait(0.3)
+         raise('left/Drive.faulted')
+         wait_answer('left/down', 1)
+         assert(now() < 2)
+         wait(8)
+         shutdown()",
+    );
+    let ran = demo.run(&["run", "story.lua", "--clock", "simulated"]);
+    assert_eq!(ran.code, 0, "{}{}", ran.out, ran.err);
+}
