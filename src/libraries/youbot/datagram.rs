@@ -30,7 +30,13 @@ pub fn bytes_of(packet: &Packet) -> [u8; LENGTH] {
     bytes
 }
 
-/// What bytes say; none where they are no packet: of another length or version, with a bit that means nothing, or a number that is none.
+/// Restarts and moments (ns) are smaller: 36 years. So nothing that is counted with them overflows.
+const FARTHEST: i64 = 1 << 60;
+/// Positions, velocities and energies are smaller.
+const LARGEST: f64 = 1e9;
+
+/// What bytes say; none where they are no packet: of another length or version, with a bit that means nothing, or a number that is none, or
+/// none of a robot's.
 pub fn packet_of(bytes: &[u8]) -> Option<Packet> {
     let mut rest = bytes.strip_prefix(&MAGIC).filter(|_| bytes.len() == LENGTH)?;
     let mut eight = || {
@@ -38,14 +44,16 @@ pub fn packet_of(bytes: &[u8]) -> Option<Packet> {
         rest = after;
         Some(*part)
     };
-    let mut whole = || eight().map(i64::from_le_bytes);
+    let mut whole = || eight().map(i64::from_le_bytes).filter(|whole| whole.abs_diff(0) < FARTHEST.unsigned_abs());
     let (epoch, seq, stamp, echo) = (whole()?, whole()?, whole()?, Echo { stamp: whole()?, heard: whole()? });
-    let mut number = || eight().map(f64::from_le_bytes).filter(|number| number.is_finite());
+    // Not a number is not smaller than anything.
+    let is_one = |number: &f64| number.abs() < LARGEST;
+    let mut number = || eight().map(f64::from_le_bytes).filter(is_one);
     let (p, v) = ([number()?, number()?, number()?], [number()?, number()?, number()?]);
     let (flags, after) = rest.split_first()?;
     let energy = f64::from_le_bytes(after.try_into().ok()?);
     let is = |bit: u8| flags & 1 << bit != 0;
-    let known = *flags < 8 && energy.is_finite();
+    let known = *flags < 8 && is_one(&energy) && epoch >= 0 && seq >= 0;
     known.then_some(Packet { epoch, seq, stamp, echo, p, v, aligned: is(0), copying: is(1), yields: is(2), energy })
 }
 
@@ -105,8 +113,8 @@ mod tests {
     use proptest::prelude::*;
 
     fn packet() -> Packet {
-        let echo = Echo { stamp: -7, heard: i64::MAX };
-        let (p, v) = ([0.1, -0.2, 1e-300], [f64::MAX, -0.0, 3.5]);
+        let echo = Echo { stamp: -7, heard: FARTHEST - 1 };
+        let (p, v) = ([0.1, -0.2, 1e-300], [0.999e9, -0.0, 3.5]);
         Packet {
             epoch: 3,
             seq: 9,
@@ -139,10 +147,22 @@ mod tests {
         assert_eq!(packet_of(&[&good[..], &[0]].concat()), None);
         assert_eq!(with(3, b'2'), None, "of another version");
         assert_eq!(with(LENGTH - 9, 8), None, "a bit that means nothing");
-        let no_number = f64::NAN.to_le_bytes();
-        let mut bytes = good;
-        bytes[44..52].copy_from_slice(&no_number);
-        assert_eq!(packet_of(&bytes), None);
+        let eight = |at: usize, part: [u8; 8]| {
+            let mut bytes = good;
+            bytes[at..at + 8].copy_from_slice(&part);
+            packet_of(&bytes)
+        };
+        for number in [f64::NAN, f64::INFINITY, -1e9] {
+            assert_eq!(eight(44, number.to_le_bytes()), None, "{number}");
+            assert_eq!(eight(LENGTH - 8, number.to_le_bytes()), None, "{number}");
+        }
+        // An epoch, a number and three moments.
+        for (at, least) in [(4, 0), (12, 0), (20, -FARTHEST + 1), (28, -FARTHEST + 1), (36, -FARTHEST + 1)] {
+            assert!(eight(at, least.to_le_bytes()).is_some() && eight(at, (FARTHEST - 1).to_le_bytes()).is_some());
+            for whole in [i64::MIN, least - 1, FARTHEST, i64::MAX] {
+                assert_eq!(eight(at, whole.to_le_bytes()), None, "{whole} at {at}");
+            }
+        }
     }
 
     proptest! {
