@@ -9,6 +9,7 @@ local law   = param("law", "position")  -- or tank
 local Ba    = param("damping", 2)       -- N s/m
 local friction = param("friction", 0.1) -- of the joints, as a share of the nominal one
 
+assert(law == "position" or law == "tank", "`law` is position or tank")
 deploy(law == "tank" and "observed/tank.yaml" or "observed/coupling.yaml")
 
 local ROBOTS = { "left", "right" }

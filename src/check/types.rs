@@ -2,7 +2,7 @@
 
 use crate::model::codes::{TYPE_CIRCLE, TYPE_EXCLUSIVE, TYPE_UNKNOWN_OPERATION, TYPE_UNKNOWN_TYPE, TYPE_WITHOUT_CODE};
 use crate::model::finding::did_you_mean;
-use crate::model::{Catalogue, ComponentType, Deployment, Effect, Finding, Findings, Ident, TypeName};
+use crate::model::{Catalogue, ComponentType, Deployment, Effect, Finding, Findings, Ident, Tunable, TypeName};
 use std::collections::{BTreeSet, VecDeque};
 
 /// What is wrong with the declared types: names of other types and of operations that are not there.
@@ -66,9 +66,12 @@ pub fn check(deployment: &Deployment, catalogue: &Catalogue) -> Findings {
 fn exclusive(deployment: &Deployment, ty: &ComponentType) -> Option<Finding> {
     let (resource, (property, why)) = ty.exclusive.iter().find_map(|one| Some((one, one.misfit(ty)?)))?;
     let path = format!("types.{}.exclusive", ty.name);
-    let help = match ty.properties.contains_key(&property) {
-        true => format!("mark it: `{property}: {{ type: string, tunable: unconfigured }}`"),
-        false => did_you_mean(property.as_str(), "properties", ty.properties.keys().map(Ident::as_str)),
+    let help = match ty.properties.get(&property) {
+        Some(of) if of.tunable != Tunable::Unconfigured => {
+            format!("mark it: `{property}: {{ type: {}, tunable: unconfigured }}`", of.ty)
+        }
+        Some(_) => format!("give `{property}` one of these types, or name the thing without it"),
+        None => did_you_mean(property.as_str(), "properties", ty.properties.keys().map(Ident::as_str)),
     };
     let finding = Finding::error(TYPE_EXCLUSIVE, format!("{}: `{resource}` is no name of one thing: {why}", ty.name));
     Some(finding.at(deployment.key_origins.get(&path).copied().unwrap_or(ty.origin)).path(path).help(help))

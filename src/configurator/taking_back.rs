@@ -37,7 +37,13 @@ impl Engine {
     pub(super) fn without_refused(&mut self, mut batch: Batch) -> Option<Batch> {
         let stopping = self.began.is_some();
         let led = |ask: Ask| match ask {
-            Ask::Apply(id) | Ask::UndoOf(id) => self.leaving_inside.1.iter().any(|path| LedDown::Inside(*path).has(id)),
+            Ask::Apply(id) | Ask::UndoOf(id) => self.is_led_inside(id),
+            // The newest of an operator's.
+            Ask::Undo => {
+                let own = |frame: &&Arc<Frame>| frame.requester == Requester::Operator;
+                let newest = self.world.stack.frames().iter().rev().find(own);
+                newest.is_some_and(|frame| self.is_led_inside(frame.configuration))
+            }
             _ => false,
         };
         if stopping || self.leaving.is_some() || batch.requests.iter().any(|request| led(request.ask)) {
@@ -53,6 +59,11 @@ impl Engine {
             out.into_iter().for_each(|request| self.refuse(request));
         }
         (!batch.requests.is_empty()).then_some(batch)
+    }
+
+    /// Whether a configuration is of a subsystem that is led down by itself.
+    fn is_led_inside(&self, id: ConfigId) -> bool {
+        self.leaving_inside.1.iter().any(|path| LedDown::Inside(*path).has(id))
     }
 
     fn refuse(&mut self, request: Request) {

@@ -67,10 +67,12 @@ fn named(
         b.footprint.touch(Slot::State(component), Access::Need);
     }
     for transition in path {
-        if let Some(id) = b.step(Step::State { component, transition: *transition }, None, entry.origin, frontier) {
-            frontier.clear();
-            frontier.push(id);
-        }
+        // What would follow a move that is refused is not told again.
+        let Some(id) = b.step(Step::State { component, transition: *transition }, None, entry.origin, frontier) else {
+            break;
+        };
+        frontier.clear();
+        frontier.push(id);
     }
 }
 
@@ -192,6 +194,9 @@ fn bring(
                 origin(*component),
                 &waits,
             );
+            if previous.is_none() {
+                break;
+            }
             if *transition == key {
                 own = previous;
             }

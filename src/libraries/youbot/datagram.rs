@@ -77,14 +77,22 @@ impl DatagramLink {
     /// What the system says, with the address.
     pub fn open(bind: &str, peer: &str) -> Result<Self, String> {
         let address = |text: &str, what: &str| {
-            text.parse::<SocketAddr>().map_err(|_| format!("`{text}` is no address ({what}): write `127.0.0.1:4000`"))
+            let wrong = || {
+                format!(
+                    "`{text}` is no address ({what}): write `127.0.0.1:4000` or `[::1]:4000`; names are not looked up"
+                )
+            };
+            text.parse::<SocketAddr>().map_err(|_| wrong())
         };
         let (own, other) = (address(bind, "bind")?, address(peer, "peer")?);
         let said = |what: &str, error: io::Error| format!("{what}: {error}");
-        let socket = UdpSocket::bind(own).map_err(|error| said(&format!("cannot bind to {own}"), error))?;
-        if other.ip().is_unspecified() || other.port() == 0 {
+        if own.port() == 0 {
+            return Err(format!("{own} has no port that anybody could send to (bind)"));
+        }
+        if other.ip().is_unspecified() || other.ip().is_multicast() || other.port() == 0 {
             return Err(format!("{other} is no address of one other end (peer)"));
         }
+        let socket = UdpSocket::bind(own).map_err(|error| said(&format!("cannot bind to {own}"), error))?;
         socket.connect(other).map_err(|error| said(&format!("cannot send to {other}"), error))?;
         // One bound to every address of the machine is known by the one that leads there from now on.
         if socket.local_addr().is_ok_and(|own| own == other) {
@@ -196,8 +204,11 @@ mod tests {
         for (bind, peer) in [(own.clone(), own.clone()), (own.replace("127.0.0.1", "0.0.0.0"), own.clone())] {
             assert!(DatagramLink::open(&bind, &peer).unwrap_err().ends_with("it would hear itself"), "{bind} {peer}");
         }
-        let error = DatagramLink::open(&own, &own.replace("127.0.0.1", "0.0.0.0")).unwrap_err();
-        assert!(error.ends_with("is no address of one other end (peer)"), "{error}");
+        for nobody in ["0.0.0.0:4000", "224.0.0.1:4000", "127.0.0.1:0"] {
+            let error = DatagramLink::open(&own, nobody).unwrap_err();
+            assert!(error.ends_with("is no address of one other end (peer)"), "{error}");
+        }
+        assert!(DatagramLink::open("127.0.0.1:0", &own).unwrap_err().ends_with("(bind)"));
         assert!(DatagramLink::open("here", &right).unwrap_err().contains("`here` is no address (bind)"));
     }
 }
