@@ -253,7 +253,7 @@ impl MemberRef {
     /// The reference, or why `text` is not of the form `Component.member`.
     ///
     /// # Errors
-    /// [`NameError`] naming the part at fault.
+    /// One that names the part at fault.
     pub fn new(text: &str) -> Result<Self, NameError> {
         let Some((component, member)) = text.split_once('.') else {
             return Err(NameError {

@@ -141,8 +141,8 @@ pub fn catalogue(genes: &[TypeGene], irreversible: bool) -> Arc<Catalogue> {
             ty.stop_before.push(type_name(i + 2));
         }
         ty.actuator = gene.flags & 1 != 0;
-        // A third of the types need something for themselves: all the same, or one by the value of a property.
-        if gene.flags % 6 < 2 {
+        // A sixth of the types need something for themselves: all the same, or one by the value of a property.
+        if gene.flags % 12 < 2 {
             let named = ["bus", "bus:{k0}", "bus:{k1}"][gene.flags as usize % 5 % 3];
             let thing = Resource::parse(named).unwrap();
             ty.exclusive.extend(thing.misfit(&ty).is_none().then_some(thing));
