@@ -43,6 +43,9 @@ impl Product<'_> {
         }
         for name in &reaction.emitted {
             for state in &mut states {
+                if self.parent.as_ref().is_some_and(|parent| parent.hears.contains(name)) {
+                    state.told.push(*name);
+                }
                 self.tells_child(state, *name);
                 self.confirm(state, *name);
                 self.spread(state, *name, Some(by));

@@ -1,5 +1,6 @@
 //! Subsystems as those know them who follow their parent, and as a state has them.
 
+use super::belief::Beliefs;
 use super::reactions::{Macrostep, Reactions};
 use super::state::ProductState;
 use crate::model::{Ask, ConfigId, Configuration, Deployment, EventName, Ident, Subsystem, SubsystemStanding};
@@ -27,6 +28,8 @@ pub struct Child {
     pub holds: BTreeSet<String>,
     /// It may do so though nobody has begun it.
     pub unbidden: bool,
+    /// What may be known of it; none: it may tell anything in any order.
+    pub beliefs: Option<Beliefs>,
 }
 
 /// Of so many subsystems of one file it is known how they stand.
@@ -46,7 +49,8 @@ impl Child {
             let touching = deployment.configurations.iter().filter(touches).map(|c| c.id).collect();
             let (begins, down) = (own.deploy.event.within(path), SubsystemStanding::Down.event(path));
             let (holds, unbidden) = (subsystem.holds.clone(), !subsystem.holds.is_empty() && is_unbidden(subsystem));
-            Self { path, begins, from, up: SubsystemStanding::Up.event(path), until, down, touching, holds, unbidden }
+            let (up, beliefs) = (SubsystemStanding::Up.event(path), None);
+            Self { path, begins, from, up, until, down, touching, holds, unbidden, beliefs }
         };
         deployment.subsystems.iter().take(MOST_CHILDREN).map(of).collect()
     }

@@ -1,9 +1,12 @@
 //! A deployment with subsystems: each file is followed alone, and never the product of them (semantics: *Composition*).
 //!
 //! A subsystem is followed as the deployment that its file is: whatever its parent may raise comes from outside there, at any time. The
-//! parent is followed against subsystems that may tell whatever they tell at all, once it has begun them; of what they are made of there
+//! parent is followed against their interface automata ([`derived`](super::derived)); of what they are made of there
 //! are the components that they export, which are there while that is promised ([`promises`](super::promises) holds both to it).
 
+use super::around::Around;
+use super::automaton::InterfaceAutomaton;
+use super::derived::ParentInterface;
 use super::report::{Accepted, Explored, Report};
 use super::simulated;
 use super::trace::{Does, TraceStep};
@@ -18,24 +21,34 @@ use crate::stack::contenders::may_hold;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-/// Checks a deployment, each of its files alone: `one` checks one.
+/// What there is to say of a file, and what it shows its parent, where that was asked for and is known.
+pub type Shown = (Report, Option<Arc<InterfaceAutomaton>>);
+
+/// Checks a deployment, each of its files alone: `one` checks one. `around`: what is around all of it.
 pub fn run(
     whole: Arc<Deployment>,
     catalogue: &Catalogue,
-    one: &dyn Fn(Arc<Deployment>, &Catalogue) -> Report,
-) -> Report {
+    around: &Around,
+    one: &dyn Fn(Arc<Deployment>, &Catalogue, &Around) -> Shown,
+) -> Shown {
     if whole.own.is_none() {
-        return one(whole, catalogue);
+        return one(whole, catalogue, around);
     }
     let mut reports: Vec<(Option<Ident>, Report)> = Vec::new();
-    let mut done: Vec<&Arc<Deployment>> = Vec::new();
+    let mut around = Around { parent: around.parent.clone(), ..Around::default() };
     for subsystem in &whole.subsystems {
-        if done.iter().any(|own| Arc::ptr_eq(own, &subsystem.own)) {
+        let alike = whole.subsystems.iter().find(|other| Arc::ptr_eq(&other.own, &subsystem.own));
+        if let Some(first) = alike.filter(|first| first.name != subsystem.name) {
+            if let Some(shows) = around.children.get(&first.name).cloned() {
+                around.children.insert(subsystem.name, shows);
+            }
             continue;
         }
-        done.push(&subsystem.own);
         let local = catalogue.known_in(subsystem.name);
-        reports.push((Some(subsystem.name), run(subsystem.own.clone(), &local, one)));
+        let parent = Some(ParentInterface::of(whole.own_part(), subsystem));
+        let (report, shows) = run(subsystem.own.clone(), &local, &Around { parent, ..Around::default() }, one);
+        around.children.extend(shows.map(|shows| (subsystem.name, shows)));
+        reports.push((Some(subsystem.name), report));
     }
     let (mut view, types) = parents_view(whole.own_part(), catalogue);
     // Steps of subsystems may be meant, also of what these do not export.
@@ -45,13 +58,13 @@ pub fn run(
         let inside = held.iter().filter(|(component, _)| component.local(subsystem.name).is_some());
         subsystem.holds = inside.flat_map(|(_, names)| names.iter().cloned()).collect();
     }
-    let mut report = one(Arc::new(view), &types);
+    let (mut report, shows) = one(Arc::new(view), &types, &around);
     for finding in simulated::faults(whole.own_part(), &whole, &Universe::new(&whole, catalogue)) {
         report.findings.push(finding);
         report.traces.push(Vec::new());
     }
     reports.push((None, report));
-    put_together(whole, reports)
+    (put_together(whole, reports), shows)
 }
 
 /// A deployment as its own file has it, with what its subsystems export.

@@ -35,7 +35,10 @@ impl Graph<'_, '_> {
     pub(super) fn ways_down(&mut self, stuck: &FxHashSet<u32>, found: &mut Traced) {
         let reaches = self.reaching_down(|_, _| true);
         let several = self.product.members.len() > 1;
-        let lost = |at: &u32| !reaches[*at as usize] && (!several || self.states[*at as usize].is_at_rest());
+        let lost = |at: &u32| {
+            let rests = !several || self.states[*at as usize].is_at_rest();
+            !reaches[*at as usize] && rests && !self.is_stranded(*at)
+        };
         let all: Vec<u32> = (0u32..).zip(&self.states).map(|(at, _)| at).filter(lost).collect();
         let leaves: FxHashSet<&[NodeId]> = stuck.iter().map(|at| &self.states[*at as usize].leaves[..]).collect();
         let some: Vec<u32> = if several {

@@ -152,10 +152,12 @@ impl Product<'_> {
                 // What they tell each other comes of them where all goes well.
                 let wanted = name == tried.first;
                 let comes = if first { wanted } else { !self.deployment.is_told_between(name.as_str()) };
-                // It is wanted up once.
-                comes && name != tried.never && (first || tried.stopping || !wanted)
+                // Of subsystems what they tell where nothing fails in them. It is wanted up once.
+                let well = next.failed == Failed::Nothing || !self.is_told_by_child(name);
+                comes && well && name != tried.never && (first || tried.stopping || !wanted)
             }
             Move::Time(..) | Move::Confirmed(_) => !first,
+            Move::Unheard(_) => !first && next.failed == Failed::Nothing,
             // Where it is not confirmed it is taken back, if that does not fail.
             Move::Answer => !first && next.answers.iter().any(|(_, verdict)| *verdict == Verdict::Reverted),
             _ => false,

@@ -10,10 +10,11 @@ use super::once::Once;
 use super::outcome::WorldId;
 use super::product::Product;
 use super::report::Explored;
+use super::shared_list::SharedList;
 use super::state::{Failed, Move, Next, Nexts, ProductState, Reacts, Trouble};
 use super::world::Top;
 use crate::limits;
-use crate::model::{Ask, ConfigId, Findings, Verdict};
+use crate::model::{Ask, ConfigId, EventName, Findings, Verdict};
 use crate::stack::Requester;
 use indexmap::{IndexMap, IndexSet};
 use rustc_hash::{FxBuildHasher, FxHashMap, FxHashSet};
@@ -106,6 +107,10 @@ pub struct Graph<'p, 'a> {
     pub(super) ways: FxHashMap<Failed, Ways>,
     /// Which steps of the simulated platform's reactions are done on edges on which nothing fails, by the reactions' places.
     reacts: FxHashMap<u32, Reacts>,
+    /// Events that let a subsystem go, and come to nothing there.
+    pub(super) in_vain: Vec<(u32, EventName)>,
+    /// What is told the parent on an edge.
+    pub(super) told: FxHashMap<u32, SharedList<EventName>>,
     /// The cycles of edges that are gone round where an edge is no move.
     pub(super) rounds: FxHashMap<u32, Vec<u32>>,
 }
@@ -151,6 +156,8 @@ pub fn explore<'p, 'a>(product: &'p mut Product<'a>) -> Graph<'p, 'a> {
         open: BinaryHeap::new(),
         ways: FxHashMap::default(),
         reacts: FxHashMap::default(),
+        in_vain: Vec::new(),
+        told: FxHashMap::default(),
         rounds: FxHashMap::default(),
     };
     match graph.product.start() {
@@ -310,7 +317,7 @@ impl Graph<'_, '_> {
             let quiet = failed == Failed::Nothing && matches!(next.by, Move::Answer | Move::Taken(..));
             let dropped = matches!(next.by, Move::Dropped(_));
             let shown = !next.state.aside && shows.shows(self.product, &state, &next);
-            let by = next.by;
+            let (by, told) = (next.by, next.told.clone());
             let (mut next, class) = self.abstracted(next, so_far);
             next.aside &= self.product.worlds.top(next.world).is_none();
             if next.aside {
@@ -321,6 +328,11 @@ impl Graph<'_, '_> {
             let to = self.reach(next, so_far.max(class), depth);
             if class == Failed::Nothing && !reacts.is_empty() {
                 self.reacts.insert(u32::try_from(self.edges.len()).unwrap_or(NOWHERE), reacts);
+            }
+            let in_vain = told.iter().filter(|name| self.product.is_told_by_child(**name));
+            self.in_vain.extend(in_vain.map(|name| (at, *name)));
+            if !told.is_empty() {
+                self.told.insert(u32::try_from(self.edges.len()).unwrap_or(NOWHERE), told);
             }
             let by = self.moved(by);
             let barred = self.moves[by as usize].filter(|_| state.stopping);

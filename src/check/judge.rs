@@ -38,6 +38,7 @@ impl Graph<'_, '_> {
         self.safety(&mut found);
         self.warned(&mut found);
         self.promises(&mut found);
+        self.let_go_in_vain(&mut found);
         self.exclusives(&mut found);
         self.exports_stay(&mut found);
         found
@@ -432,7 +433,7 @@ impl Graph<'_, '_> {
             let state = &self.states[at as usize];
             let known = self.product.worlds.top(state.world).is_none();
             let over = self.product.is_down(state) || self.ends.contains(&at) || troubled.contains(&at);
-            if !leads_on[at as usize] && self.followed[at as usize] && !over && known {
+            if !leads_on[at as usize] && self.followed[at as usize] && !over && known && !self.is_stranded(at) {
                 stuck.insert(at);
             }
         }
@@ -445,6 +446,7 @@ impl Graph<'_, '_> {
             let leaf = leaves[0];
             if told.insert(leaves) {
                 let finding = self.product.nothing_leads_on(leaf);
+                let finding = self.told_before(leaf).into_iter().fold(finding, Finding::help);
                 let trace = self.trace(at);
                 found.push((finding, trace));
             }

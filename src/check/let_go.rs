@@ -1,17 +1,16 @@
-//! Between a parent and a subsystem that waits to be let go, by the texts alone: what lets it go comes, and not before it is waited
-//! for.
+//! Between a parent and a subsystem that waits to be let go, by the texts alone: what lets it go comes, and not in the step that ends it where
+//! that is too early. That it is lost elsewhere is found by following the parent ([`promises`](super::promises)).
 
 use super::reactions::{Macrostep, Reactions};
 use crate::model::codes::COMPOSE_UNLEFT;
-use crate::model::{Deployment, EventName, Finding, Findings, Subsystem, SubsystemStanding};
+use crate::model::{Deployment, EventName, Finding, Findings, Subsystem};
 use crate::stack::Requester;
 use crate::statechart::{Chart, EventId, NodeId, RaiseSite, compile};
 use rustc_hash::FxHashSet;
 
 /// What is wrong with how a deployment lets a subsystem go. `charts` are its own.
 pub fn check(own: &Deployment, subsystem: &Subsystem, charts: &[&Chart]) -> Findings {
-    let early = || unasked(own, subsystem, charts).or_else(|| too_early(own, subsystem, charts));
-    let finding = never(subsystem, charts).or_else(early);
+    let finding = never(subsystem, charts).or_else(|| too_early(own, subsystem, charts));
     finding.into_iter().collect()
 }
 
@@ -31,63 +30,6 @@ fn never(subsystem: &Subsystem, charts: &[&Chart]) -> Option<Finding> {
             .at(site.origin)
             .help(format!("raise `{until}` when nothing of what it exports is held any more")),
     )
-}
-
-/// It is let go where it has not said that it wants to leave, and nobody has told it to: it does not wait for that yet. Told of one
-/// coordinator, which knows of the one or the other.
-fn unasked(own: &Deployment, subsystem: &Subsystem, charts: &[&Chart]) -> Option<Finding> {
-    let leaving = subsystem.own.interface.leaving?;
-    let path = subsystem.name;
-    let (until, says) = (leaving.until.within(path), leaving.says.within(path));
-    let (begins, ends) = (subsystem.own.deploy.event.within(path), subsystem.own.shutdown.event.within(path));
-    let down = SubsystemStanding::Down.event(path);
-    let early = charts.iter().any(|chart| {
-        let raises = |event| chart.raises().iter().any(|site| site.name == event);
-        let (says, down) = (chart.event(says), chart.event(down));
-        if !raises(until) || !raises(ends) && says == EventId::OTHER {
-            return false;
-        }
-        let mut reactions = Reactions::new(own, chart, &[], Requester::Operator, None);
-        let Some(first) = reactions.enter() else { return false };
-        // Whether letting it go comes to nothing: it may not wait for that yet.
-        let after = |before: bool, step: &Macrostep| {
-            let has = |event| step.emitted.contains(&event);
-            !has(ends) && (has(begins) || before)
-        };
-        // In one step what is raised first comes first.
-        let lets_go = |before: bool, step: &Macrostep| {
-            let at = |event| step.emitted.iter().position(|raised| *raised == event);
-            let early = before || at(begins).is_some();
-            at(until).is_some_and(|until| early && at(ends).is_none_or(|ends| until < ends))
-        };
-        let start = (first.leaf, after(false, &first));
-        let (mut all, mut met) = (vec![start], FxHashSet::from_iter([start]));
-        let events: Vec<EventId> = chart.events().iter().map(|event| chart.event(*event)).collect();
-        let mut at = 0;
-        while let Some((leaf, early)) = all.get(at).copied() {
-            at += 1;
-            let timed = reactions.offers(leaf);
-            for event in events.iter().chain(timed.iter()).copied() {
-                let told = event != EventId::OTHER && [says, down].contains(&event);
-                let heard = early && !told;
-                let step = reactions.react(leaf, event);
-                let next = (step.leaf, after(heard, &step));
-                if lets_go(heard, &step) {
-                    return true;
-                }
-                if met.insert(next) {
-                    all.push(next);
-                }
-            }
-        }
-        false
-    });
-    let site = raised(charts, until).filter(|_| early)?;
-    let message = format!(
-        "`{until}` may be raised where `{path}` does not wait for it: it has not said `{says}`, and `{ends}` was not raised"
-    );
-    let help = format!("raise `{until}` when `{says}` was heard, or with `{ends}` or after it");
-    Some(Finding::warning(COMPOSE_UNLEFT, message).at(site.origin).also(subsystem.origin, "the subsystem").help(help))
 }
 
 /// It is let go in the step that ends it, and does not wait for that at once: what comes before is lost.

@@ -5,9 +5,12 @@
 
 mod adjacency;
 mod alone;
+mod around;
 mod arrive;
 mod aside;
+mod automaton;
 mod bars;
+mod belief;
 mod bound;
 mod children;
 mod closed;
@@ -17,6 +20,7 @@ mod configurations;
 mod coordinator;
 mod coupling;
 mod declared;
+mod derived;
 mod desks;
 mod detours;
 mod down;

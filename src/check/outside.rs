@@ -17,6 +17,7 @@ impl Product<'_> {
         let heard = self.times_come(state, nexts);
         self.unheard_shutdown(state, &heard, nexts);
         self.events_come(state, heard, nexts);
+        self.children_tell(state, nexts);
         self.notices(state, nexts);
         self.operators(state, nexts);
         self.safe_comes_elsewhere(state, nexts);
@@ -66,6 +67,7 @@ impl Product<'_> {
         let state = ProductState { across: true, ..state.clone() };
         self.times_come(&state, nexts);
         self.events_come(&state, self.alike.iter().copied().collect(), nexts);
+        self.children_tell(&state, nexts);
     }
 
     /// Time passes for each. Answers the events from outside that are heard where they are.
@@ -92,6 +94,7 @@ impl Product<'_> {
             let name = self.outside[at];
             if self.waits_for_others() && state.stopping && name == self.deployment.deploy.event
                 || self.is_silent(state, name)
+                || self.is_known(name)
             {
                 continue;
             }
@@ -105,8 +108,39 @@ impl Product<'_> {
         }
     }
 
+    /// Each subsystem of which it is known tells what it may tell now. What nobody hears was told all the same.
+    fn children_tell(&mut self, state: &ProductState, nexts: &mut Nexts) {
+        for at in 0..self.children.len() {
+            let path = self.children[at].path;
+            let belief = state.beliefs.get(at).copied().unwrap_or_default();
+            let Some(beliefs) = &mut self.children[at].beliefs else { continue };
+            for (event, failed, then) in beliefs.tells(belief).iter() {
+                let name = event.within(path);
+                let Some(place) = self.outside.iter().position(|outside| *outside == name) else { continue };
+                let place = u16::try_from(place).unwrap_or(u16::MAX);
+                let members = self.members.iter_mut().zip(&state.leaves).enumerate();
+                let takes = members.filter_map(|(number, (member, leaf))| member.takes(*leaf, name).then_some(number));
+                let takes: SmallVec<[usize; 2]> = takes.collect();
+                if takes.iter().any(|number| self.is_busy(state, *number)) {
+                    nexts.cut = true;
+                    continue;
+                }
+                let mut next = state.clone();
+                next.beliefs.set(at, *then);
+                if takes.is_empty() && state.inbox.is_empty() {
+                    self.hears_of_child(&mut next, name);
+                    nexts.all.push(Next::plain(Move::Unheard(place), next, *failed));
+                } else {
+                    let from = nexts.all.len();
+                    self.raised(&next, name, Move::Event(place), nexts);
+                    nexts.all[from..].iter_mut().for_each(|next| next.failed = next.failed.max(*failed));
+                }
+            }
+        }
+    }
+
     /// Whether a coordinator waits for as many answers as are followed.
-    fn is_busy(&self, state: &ProductState, number: usize) -> bool {
+    pub(super) fn is_busy(&self, state: &ProductState, number: usize) -> bool {
         state.outstanding(self.members[number].by) >= self.most_waiting
     }
 
@@ -117,7 +151,9 @@ impl Product<'_> {
             self.deployment.configurations.iter().any(|c| c.confirm.is_some_and(|confirm| confirm.event == name))
         };
         let triggered = |name: EventName| -> Option<Vec<(usize, EdgeId)>> {
-            let own = [self.deployment.deploy.event, self.deployment.shutdown.event].contains(&name) || confirms(name);
+            let own = [self.deployment.deploy.event, self.deployment.shutdown.event].contains(&name)
+                || confirms(name)
+                || self.is_told_by_child(name);
             let pure = self.members.iter().all(|member| member.chart.is_pure());
             let of = |(number, member): (usize, &Member<'_>)| {
                 let (chart, event) = (member.chart, member.chart.event(name));

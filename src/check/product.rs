@@ -14,6 +14,7 @@ use super::aside::Aside;
 use super::children::{Child, WatchedSubsystem};
 use super::coordinator::outside_events;
 use super::coupling;
+use super::derived::ParentInterface;
 use super::desks::{Desks, PlainBatch};
 use super::effort::{Effort, Left};
 use super::members::{Member, hears_loss, members};
@@ -96,6 +97,8 @@ pub struct Product<'a> {
     pub(super) children: Vec<Child>,
     /// The same where their coordinators are among these.
     pub(super) watched: Vec<WatchedSubsystem>,
+    /// What they have to do with the parent of their deployment, if it is looked at.
+    pub(super) parent: Option<ParentInterface>,
     /// How much more is followed.
     pub(super) effort: Left<'a>,
     /// What is known of reactions to steps.
@@ -154,6 +157,7 @@ impl<'a> Product<'a> {
             aside: Aside::default(),
             children: if deployment.own.is_none() { Child::all(deployment) } else { Vec::new() },
             watched: Vec::new(),
+            parent: None,
             effort: Effort::default().into(),
             reacts: FxHashMap::default(),
             spare: Vec::new(),
@@ -211,6 +215,8 @@ impl<'a> Product<'a> {
             leaving: false,
             elsewhere: false,
             children: 0,
+            beliefs: SharedList::new(),
+            told: SharedList::new(),
             moved: 0,
             across: false,
             in_transit: SharedList::new(),
@@ -219,8 +225,8 @@ impl<'a> Product<'a> {
         for (by, reaction) in entered.iter().enumerate() {
             states = states.into_iter().flat_map(|state| self.follow(state, by, reaction)).collect();
         }
-        // What several may come to is what one of them comes to a moment later.
-        states.into_iter().next()
+        // What several may come to is what one of them comes to a moment later; what is told at the start is told before anybody listens.
+        states.into_iter().next().map(|state| ProductState { told: SharedList::new(), ..state })
     }
 
     /// All that follows from a state.
@@ -301,7 +307,11 @@ impl<'a> Product<'a> {
     /// A coordinator hears an event.
     pub(super) fn hear(&mut self, state: ProductState, number: usize, event: EventId, by: Move, nexts: &mut Nexts) {
         let mut state = state;
-        self.hears_of_child(&mut state, number, event);
+        if !self.children.is_empty()
+            && let Some(name) = self.members[number].name_of(event)
+        {
+            self.hears_of_child(&mut state, name);
+        }
         self.begins_subsystem(&mut state, number, event);
         for state in self.react(state, number, event) {
             let next = Next::plain(by, self.settle(state), Failed::Nothing);

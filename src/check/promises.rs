@@ -6,19 +6,17 @@ use super::children::{Child, DOUBT, begun, promised, released};
 use super::explore::Graph;
 use super::judge::{Traced, severity_of};
 use super::product::Product;
+use super::reactions::triggers;
 use super::state::{Failed, ProductState};
-use crate::model::codes::COMPOSE_PROMISE;
+use crate::model::codes::{COMPOSE_PROMISE, COMPOSE_UNLEFT};
 use crate::model::{Ask, ConfigId, EventName, Finding};
-use crate::statechart::EventId;
+use crate::statechart::NodeId;
 use rustc_hash::FxHashMap;
+use std::collections::BTreeMap;
 
 impl Product<'_> {
-    /// A coordinator hears an event: it may tell how a subsystem stands.
-    pub(super) fn hears_of_child(&self, state: &mut ProductState, number: usize, event: EventId) {
-        if self.children.is_empty() {
-            return;
-        }
-        let Some(name) = self.members[number].name_of(event) else { return };
+    /// An event is heard, or would be if anybody waited for it: it may tell how a subsystem stands.
+    pub(super) fn hears_of_child(&self, state: &mut ProductState, name: EventName) {
         for (at, child) in self.children.iter().enumerate() {
             if name == child.from || name == child.up {
                 // What comes after it was let go may have been told before.
@@ -32,8 +30,18 @@ impl Product<'_> {
     }
 
     /// A coordinator raises an event: it may be for a subsystem.
-    pub(super) fn tells_child(&self, state: &mut ProductState, name: EventName) {
-        for (at, child) in self.children.iter().enumerate() {
+    pub(super) fn tells_child(&mut self, state: &mut ProductState, name: EventName) {
+        for (at, child) in self.children.iter_mut().enumerate() {
+            if let (Some(beliefs), Some(own)) = (&mut child.beliefs, name.local(child.path))
+                && let Ok(own) = EventName::new(own)
+            {
+                let belief = state.beliefs.get(at).copied().unwrap_or_default();
+                let (then, lost) = beliefs.raised(belief, own);
+                state.beliefs.set(at, then);
+                if lost && name == child.until && state.children & begun(at) != 0 {
+                    state.told.push(name);
+                }
+            }
             if name == child.begins {
                 if state.children & begun(at) != 0 && !child.holds.is_empty() {
                     state.children |= DOUBT;
@@ -59,6 +67,11 @@ impl Product<'_> {
         let told =
             |child: &Child| name.local(child.path).is_some_and(|own| !own.ends_with(crate::model::subsystem::IGNORED));
         children.any(|(at, child)| told(child) && state.children & begun(at) == 0)
+    }
+
+    /// Whether it is known when an event comes that a subsystem tells.
+    pub(super) fn is_known(&self, name: EventName) -> bool {
+        self.children.iter().any(|child| child.beliefs.is_some() && name.local(child.path).is_some())
     }
 
     /// Whether a subsystem tells an event.
@@ -129,6 +142,50 @@ impl Graph<'_, '_> {
                 Finding::new(severity, COMPOSE_PROMISE, message).at(place).path(format!("configurations.{id}"));
             let trace = self.trace(at);
             found.push((finding.help(help), trace));
+        }
+    }
+
+    /// What is to come down there waits for a subsystem in which an undo has failed: that one may be stranded.
+    pub(super) fn is_stranded(&self, at: u32) -> bool {
+        let known = self.product.children.iter().any(|child| child.beliefs.is_some());
+        known && self.failed[at as usize] >= Failed::Undo && !self.product.children_down(&self.states[at as usize])
+    }
+
+    /// What to do about a state that waits for what a subsystem tells and tells no more.
+    pub(super) fn told_before(&self, leaf: NodeId) -> Option<String> {
+        let member = &self.product.members[0];
+        let waits = triggers(member.chart, leaf).0.into_iter().filter_map(|event| member.name_of(event));
+        let told: Vec<String> =
+            waits.filter(|name| self.product.is_known(*name)).map(|name| format!("`{name}`")).collect();
+        (!told.is_empty()).then(|| {
+            format!("{} may have been told before, where nobody waited for it: hear it there as well", told.join(", "))
+        })
+    }
+
+    /// A parent lets a subsystem go where that waits for it.
+    pub(super) fn let_go_in_vain(&mut self, found: &mut Traced) {
+        let mut some: BTreeMap<EventName, Vec<u32>> = BTreeMap::new();
+        for (at, name) in &self.in_vain {
+            if self.failed[*at as usize] == Failed::Nothing {
+                some.entry(*name).or_default().push(*at);
+            }
+        }
+        for (name, states) in some {
+            let Some(at) = self.best_first(states).first().copied() else { continue };
+            let Some(child) = self.product.children.iter().find(|child| child.until == name) else { continue };
+            let deployment = self.product.deployment;
+            let Some(subsystem) = deployment.subsystems.iter().find(|of| of.name == child.path) else { continue };
+            let Some(leaving) = subsystem.own.interface.leaving else { continue };
+            let (says, ends) = (leaving.says.within(child.path), subsystem.own.shutdown.event.within(child.path));
+            let raises = self.product.members.iter().flat_map(|member| member.chart.raises());
+            let site = raises.filter(|site| site.name == name).map(|site| site.origin).next();
+            let message = format!("`{name}` is raised where `{}` does not wait for it, and is lost", child.path);
+            let finding = Finding::warning(COMPOSE_UNLEFT, message)
+                .at(site.unwrap_or_default())
+                .also(subsystem.origin, "the subsystem")
+                .help(format!("raise `{name}` when `{says}` was heard, which comes of `{ends}` at the latest"));
+            let trace = self.trace(at);
+            found.push((finding, trace));
         }
     }
 }

@@ -366,10 +366,10 @@ impl Product<'_> {
             return Does::Cannot("an answer comes while what would stop it is on its way");
         }
         match next.by {
-            Move::Event(at) if self.is_told_by_child(self.outside[usize::from(at)]) => {
+            Move::Event(at) | Move::Unheard(at) if self.is_told_by_child(self.outside[usize::from(at)]) => {
                 Does::Cannot("a subsystem tells something just then")
             }
-            Move::Event(at) | Move::Dropped(at) => Does::Raise(self.outside[usize::from(at)]),
+            Move::Event(at) | Move::Dropped(at) | Move::Unheard(at) => Does::Raise(self.outside[usize::from(at)]),
             Move::Confirmed(id) => match self.worlds.configuration(id).and_then(|c| c.confirm) {
                 Some(confirm) => Does::Raise(confirm.event),
                 None => Does::Nothing,

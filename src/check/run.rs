@@ -1,5 +1,7 @@
 //! The whole check, one family after the other; and single families, for who changes a running deployment.
 
+use super::around::Around;
+use super::automaton::InterfaceAutomaton;
 use super::bound::Bound;
 use super::effort::Effort;
 use super::explore::explore;
@@ -28,12 +30,16 @@ pub fn run(deployment: impl Into<Arc<Deployment>>, catalogue: &Catalogue) -> Rep
 
 /// The same with more effort, or less.
 pub fn run_with(deployment: impl Into<Arc<Deployment>>, catalogue: &Catalogue, effort: Effort<'_>) -> Report {
-    let one = |own, catalogue: &Catalogue| run_one(own, catalogue, effort);
-    if effort.together { one(deployment.into(), catalogue) } else { composed::run(deployment.into(), catalogue, &one) }
+    let one = |own, catalogue: &Catalogue, around: &Around| run_one(own, catalogue, effort, around);
+    let (report, _) = match effort.together {
+        true => one(deployment.into(), catalogue, &Around::default()),
+        false => composed::run(deployment.into(), catalogue, &Around::default(), &one),
+    };
+    report
 }
 
 /// The check of one file.
-fn run_one(shared: Arc<Deployment>, catalogue: &Catalogue, effort: Effort<'_>) -> Report {
+fn run_one(shared: Arc<Deployment>, catalogue: &Catalogue, effort: Effort<'_>, around: &Around) -> composed::Shown {
     let deployment = &*shared;
     let universe = universe::Universe::new(deployment, catalogue);
     let mut findings = types::check(deployment, catalogue);
@@ -57,7 +63,7 @@ fn run_one(shared: Arc<Deployment>, catalogue: &Catalogue, effort: Effort<'_>) -
     let mut traced: Traced = findings.into_iter().map(|finding| (finding, Vec::new())).collect();
     let mut explored = Explored::default();
     let mut left: BTreeSet<String> = BTreeSet::new();
-    let mut replayed = None;
+    let (mut replayed, mut shows) = (None, None);
     if charts.len() == all {
         let charts: Vec<&Chart> = charts.iter().collect();
         let mut findings = watched::events(deployment, &charts);
@@ -86,7 +92,8 @@ fn run_one(shared: Arc<Deployment>, catalogue: &Catalogue, effort: Effort<'_>) -
         if !traced.iter().any(|(finding, _)| finding.is_error()) {
             replayed = Some(Accepted::new(shared.clone()));
             let followed = settings::followed(deployment, &universe);
-            explored = follow(&followed, &views, &charts, catalogue, effort, &mut traced, &mut left);
+            let those = Followed { deployment: &followed, views: &views, charts: &charts, catalogue, effort, around };
+            (explored, shows) = follow(&those, &mut traced, &mut left);
             // Where there is an actuator, more is said of it.
             let said = |finding: &crate::model::Finding| {
                 traced.iter().any(|(f, _)| (f.code, f.origin.0) == (finding.code, finding.origin.0))
@@ -100,24 +107,39 @@ fn run_one(shared: Arc<Deployment>, catalogue: &Catalogue, effort: Effort<'_>) -
     let left: Vec<String> = left.into_iter().collect();
     let verdict = CheckVerdict::of(&findings, charts.len() == all, left.clone());
     let checked = (verdict != CheckVerdict::Refused).then(|| Accepted::new(shared.clone()));
-    Report { checked, replayed, findings, traces, explored, left, verdict }
+    (Report { checked, replayed, findings, traces, explored, left, verdict }, shows)
 }
 
-/// Follows the coordinators, those together that have to do with each other. `left` is told what was left out.
+/// What is followed.
+struct Followed<'f, 'e> {
+    deployment: &'f Deployment,
+    /// The deployment as each of its coordinators sees it.
+    views: &'f [Deployment],
+    charts: &'f [&'f Chart],
+    catalogue: &'f Catalogue,
+    effort: Effort<'e>,
+    around: &'f Around,
+}
+
+/// Follows the coordinators, those together that have to do with each other. `left` is told what was left out. Answers also what they show
+/// the parent of their deployment, if it has one and they are all followed together.
 fn follow(
-    deployment: &Deployment,
-    views: &[Deployment],
-    charts: &[&Chart],
-    catalogue: &Catalogue,
-    effort: Effort<'_>,
+    those: &Followed<'_, '_>,
     traced: &mut Traced,
     left: &mut BTreeSet<String>,
-) -> Explored {
+) -> (Explored, Option<Arc<InterfaceAutomaton>>) {
+    let Followed { deployment, views, charts, catalogue, effort, around } = *those;
+    let mut shows = None;
     let mut explored = Explored { complete: true, without_failure: true, ..Explored::default() };
     let all: Vec<usize> = (0..charts.len()).collect();
     let mut product = Product::new(deployment, views, charts, &all, catalogue);
     product.follow_with(effort);
+    // Of several coordinators there are too many ways with all that is known of the order in which subsystems tell things.
+    if all.len() == 1 {
+        product.stands_in(around);
+    }
     let mut found = ways::ways(&mut product);
+    product.stands_in(around);
     if product.effort.halted().is_some() {
         // Where it ended says nothing of the ways.
         found.clear();
@@ -145,12 +167,20 @@ fn follow(
         if let Some(apart) = &mut apart {
             apart.never_down = product.never_down;
             apart.follow_with(effort);
+            apart.stands_in(around);
         }
         let product = apart.as_mut().unwrap_or(&mut product);
         let (mut most_waiting, mut by_hand) = (limits::CHECK_WAITING, true);
         loop {
             product.follow_anew(most_waiting);
+            product.effort = product.most_believed();
             let mut graph = explore(product);
+            if graph.product.knows_children() && graph.bounds.contains_key(&Bound::Budget) {
+                // With all that is known of them there is too much of it.
+                graph.product.forget_children();
+                graph.product.follow_with(effort);
+                continue;
+            }
             // Anew with more of them where they are few: often there never are more at once.
             let whole = graph.product.effort.halted().is_none();
             let easy = graph.edges.len() <= limits::CHECK_EASY && most_waiting < limits::CHECK_WAITING_MOST;
@@ -206,6 +236,9 @@ fn follow(
                 graph.bounds.iter().map(|(bound, failed)| bound.told(*failed, most_waiting, effort.transitions)),
             );
             explored = explored.and(graph.explored());
+            if let Some(parent) = around.parent.as_ref().filter(|_| numbers == all && verified) {
+                shows = Some(Arc::new(graph.derived(parent)));
+            }
             asked.extend(product.worlds.asked());
             break;
         }
@@ -226,7 +259,7 @@ fn follow(
             None => traced.push((finding, way)),
         }
     }
-    explored
+    (explored, shows)
 }
 
 /// Configurations that the coordinator never asks for can still be applied by an operator. Whether they fit the system

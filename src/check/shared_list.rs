@@ -45,6 +45,21 @@ impl<T: Clone> SharedList<T> {
         self.change(|list| list.push(one));
     }
 
+    /// The one at that place becomes this one; those that are missing before it are as if nothing was said.
+    pub fn set(&mut self, at: usize, one: T)
+    where
+        T: Default + PartialEq,
+    {
+        if self.get(at) != Some(&one) {
+            self.change(|list| {
+                if list.len() <= at {
+                    list.resize(at + 1, T::default());
+                }
+                list[at] = one;
+            });
+        }
+    }
+
     /// Takes out the one at that place.
     ///
     /// # Panics

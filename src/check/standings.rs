@@ -7,6 +7,7 @@ use super::state::ProductState;
 use crate::model::SubsystemStanding;
 use crate::model::subsystem::{SeenStanding, standing};
 use crate::statechart::EventId;
+use smallvec::SmallVec;
 
 impl Product<'_> {
     /// Tells of what subsystems have come to.
@@ -31,8 +32,24 @@ impl Product<'_> {
     }
 
     fn seen_standing(&self, state: &ProductState, at: usize) -> SeenStanding {
+        let path = self.watched[at].path;
+        let mut seen = self.seen_of(state, &self.watched[at].members);
+        seen.down = seen.down && self.there(state).iter().all(|component| component.local(path).is_none());
+        seen
+    }
+
+    /// The deployment as one that all of these are of.
+    pub(super) fn seen_as_one(&self, state: &ProductState) -> SeenStanding {
+        let all: SmallVec<[usize; 4]> = (0..self.members.len()).collect();
+        let mut seen = self.seen_of(state, &all);
+        seen.down = seen.down && self.children_down(state) && self.there(state).is_empty();
+        seen
+    }
+
+    /// Where these coordinators are, and nothing else.
+    fn seen_of(&self, state: &ProductState, members: &[usize]) -> SeenStanding {
         let mut seen = SeenStanding { up: true, down: true, ..SeenStanding::default() };
-        for number in &self.watched[at].members {
+        for number in members {
             let (member, leaf) = (&self.members[*number], state.leaves[*number]);
             let inside = |node| member.chart.is_inside(leaf, node);
             let settled = state.outstanding(member.by) == 0
@@ -42,8 +59,6 @@ impl Product<'_> {
             seen.down &= settled && member.down.is_some_and(inside);
             seen.failed |= member.failed.iter().any(|failed| inside(*failed));
         }
-        let path = self.watched[at].path;
-        seen.down &= self.there(state).iter().all(|component| component.local(path).is_none());
         seen
     }
 }

@@ -4,7 +4,7 @@ use super::desks::KeptDesk;
 use super::outcome::WorldId;
 use super::shared_list::SharedList;
 use crate::model::codes::{STACK_EMPTY, STACK_NO_FRAME};
-use crate::model::{Ask, ComponentName, ConfigId, Findings, Verdict};
+use crate::model::{Ask, ComponentName, ConfigId, EventName, Findings, Verdict};
 use crate::stack::{Batch, Request, Requester, Why};
 use crate::statechart::{EventId, NodeId};
 use smallvec::SmallVec;
@@ -91,6 +91,10 @@ pub struct ProductState {
     pub elsewhere: bool,
     /// How its subsystems stand, as far as their parent can know ([`promises`](super::promises)).
     pub children: u64,
+    /// What is known of each of them ([`belief`](super::belief)); of those that are not here, what is known at the start.
+    pub beliefs: SharedList<u32>,
+    /// What was told its parent since the last move, and what was raised for a subsystem in vain; empty in a state between moves.
+    pub told: SharedList<EventName>,
     /// Coordinators that have moved since the inboxes were empty, by their bits. Kept only where events come meanwhile.
     pub moved: u64,
     /// One came meanwhile.
@@ -163,6 +167,8 @@ pub enum Move {
     Event(u16),
     /// An event comes from outside, by its place among them, and nobody hears it.
     Dropped(u16),
+    /// A subsystem tells an event, by its place among those from outside, that nobody waits for there.
+    Unheard(u16),
     /// Time passes for a coordinator.
     Time(u8, EventId),
     /// A coordinator takes what lies in its inbox.
@@ -206,6 +212,8 @@ pub struct Next {
     pub answers: Answers,
     /// The state.
     pub state: ProductState,
+    /// What its parent is told on the way, as far as that is looked at, and what is raised for a subsystem in vain.
+    pub told: SharedList<EventName>,
     /// What failed.
     pub failed: Failed,
     /// A configuration of which there are more frames than are followed, and more than are followed behind undoings that
@@ -258,7 +266,8 @@ impl Next {
     /// A state that comes with answers.
     pub(super) fn answered(by: Move, answers: Answers, mut state: ProductState, failed: Failed) -> Self {
         let failed = if std::mem::take(&mut state.stayed) { failed.max(Failed::Undo) } else { failed };
-        Self { by, answers, state, failed, deep: (None, None), by_hand: false }
+        let told = std::mem::take(&mut state.told);
+        Self { by, answers, state, told, failed, deep: (None, None), by_hand: false }
     }
 }
 

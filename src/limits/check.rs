@@ -4,6 +4,10 @@
 /// `--budget` says otherwise. About a second of work; one robot of the youBot coupling beside another one needs 364,000.
 pub const CHECK_TRANSITIONS: usize = 600_000;
 
+/// Events and answers that are followed of a parent with all that is known of the order in which its subsystems tell things. Where there are
+/// more it is followed with subsystems that may tell anything in any order: that has fewer states, and may refuse too much.
+pub const CHECK_BELIEVED: usize = 300_000;
+
 /// The largest number of transitions that `--budget` takes.
 pub const CHECK_TRANSITIONS_MOST: usize = 1_000_000_000;
 

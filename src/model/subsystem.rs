@@ -100,7 +100,15 @@ impl SubsystemStanding {
     /// # Panics
     /// Never: a word is the name of an event.
     pub fn event(self, path: Ident) -> EventName {
-        EventName::new(self.word()).expect("a word is the name of an event").within(path)
+        self.own_event().within(path)
+    }
+
+    /// The same by its name in the subsystem's own file.
+    ///
+    /// # Panics
+    /// Never: a word is the name of an event.
+    pub fn own_event(self) -> EventName {
+        EventName::new(self.word()).expect("a word is the name of an event")
     }
 }
 

@@ -1,5 +1,6 @@
 //! Deployments with subsystems: what each file is held to, and that what is found file by file holds of all together.
 
+use super::automata::{SOLO, SOLO_CONF, SOLO_COORDINATOR};
 use davit::check::{self, Effort};
 use davit::lang::{self, LoadOptions, Sources};
 use davit::libraries::monitors;
@@ -35,16 +36,20 @@ const ARM_CONF: &str = "ConfiguratorConf {
 const ARM_COORDINATOR: &str = "return state {
   idle = state {}, making = state { entry = 'make' }, starting = state { entry = { 'e_built', 'run' } }, on = state {},
   leaving = state { entry = 'e_leaving' }, stopping = state { entry = 'run.undo' }, unmaking = state { entry = 'make.undo' },
+  undone = state {},
   trans { src = 'initial', tgt = 'idle' },
   trans { src = 'idle', tgt = 'making', events = { 'e_start' } },
   trans { src = 'making', tgt = 'starting', events = { 'make.ok' } },
-  trans { src = 'making', tgt = 'unmaking', events = { 'make.failed', 'make.broken', 'e_shutdown' } },
+  trans { src = 'making', tgt = 'undone', events = { 'make.failed', 'make.broken' } },
+  trans { src = 'making', tgt = 'unmaking', events = { 'e_shutdown' } },
+  trans { src = 'undone', tgt = 'unmaking', events = { 'e_shutdown' } },
   trans { src = 'starting', tgt = 'on', events = { 'run.ok' } },
   trans { src = 'starting', tgt = 'leaving', events = { 'run.failed', 'run.broken', 'e_shutdown' } },
   trans { src = 'on', tgt = 'leaving', events = { 'e_shutdown' } },
   trans { src = 'leaving', tgt = 'stopping', events = { 'e_released' } },
   trans { src = 'stopping', tgt = 'unmaking', events = { 'run.undone', 'run.undo.failed', 'run.undo.broken' } },
-  trans { src = 'unmaking', tgt = 'idle', events = { 'make.undone', 'make.undo.failed', 'make.undo.broken' } },
+  trans { src = 'unmaking', tgt = 'idle', events = { 'make.undone' } },
+  trans { src = 'unmaking', tgt = 'undone', events = { 'make.undo.failed', 'make.undo.broken' } },
 }";
 const PAIR: &str = "davit: 1
 name: pair
@@ -158,6 +163,9 @@ pub fn files(changes: &[(&str, &str, &str)]) -> Sources {
         ("lead.lua", LEAD.to_owned()),
         ("link.lua", LINK.to_owned()),
         ("voice.lua", VOICE.to_owned()),
+        ("solo.yaml", SOLO.to_owned()),
+        ("solo_conf.lua", SOLO_CONF.to_owned()),
+        ("solo.lua", SOLO_COORDINATOR.to_owned()),
     ];
     for (file, before, after) in changes {
         let text = &mut files.iter_mut().find(|(name, _)| name == file).expect("a file of the pair").1;

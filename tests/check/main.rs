@@ -11,6 +11,7 @@ mod advice;
 mod apart;
 mod aside;
 mod asked;
+mod automata;
 mod beside;
 mod circles;
 mod composed;

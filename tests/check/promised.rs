@@ -87,7 +87,7 @@ fn what_is_passed_on_is_promised_as_long_as_the_subsystem_promises_it() {
     let unleft = |changes: &[Change]| of(changes, "compose::unleft", Severity::Error);
     assert!(unleft(&[PASSED_ON]).is_empty(), "{:#?}", found(&[PASSED_ON]));
     assert!(found(&[PASSED_ON]).iter().all(|finding| !finding.is_error()), "{:#?}", found(&[PASSED_ON]));
-    let early = ("mid.lua", "events = { 'inner/up' }", "events = { 'inner/e_start.ignored' }");
+    let early = ("mid.lua", "events = { 'inner/up' }", "events = { 'e_after(0.1)' }");
     let late = ("mid.lua", "tgt = 'leaving', events = { 'e_shutdown'", "tgt = 'lowering', events = { 'e_shutdown'");
     for wrong in [early, late] {
         let says = unleft(&[PASSED_ON, wrong]);
@@ -187,7 +187,8 @@ fn to_let_go_what_has_not_asked_for_it_is_too_early() {
     let unasked = ("pair.lua", "coupled = state {},", "coupled = state { entry = 'left/e_released' },");
     let says = early(&[unasked]);
     assert!(
-        says.len() == 1 && says[0].contains("has not said `left/e_leaving`, and `left/e_shutdown` was not"),
+        says.len() == 1
+            && says[0].contains("`left/e_released` is raised where `left` does not wait for it, and is lost"),
         "{says:?}"
     );
     // Nor before the event that ends it, in the same step.

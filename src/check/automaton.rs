@@ -1,0 +1,224 @@
+//! What a subsystem takes of its parent and tells it, and in which order: its interface automaton. Whoever follows the parent asks it what
+//! the subsystem may tell next, and follows nothing else of it.
+//!
+//! It may do everything that was followed of the subsystem, and more: where states are taken for one, each may do what any of them does.
+
+use super::state::Failed;
+use crate::model::EventName;
+use petgraph::algo::kosaraju_scc;
+use petgraph::graph::{DiGraph, NodeIndex};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// What leads from one state of an interface automaton to another.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum InterfaceAction {
+    /// Nothing that the parent can see, and what fails in it.
+    Silent(Failed),
+    /// It takes an event of its parent up; heeded: a transition takes it, or may.
+    Takes {
+        /// By its name there.
+        event: EventName,
+        /// See there.
+        heeded: bool,
+    },
+    /// It tells its parent an event.
+    Tells(EventName),
+}
+
+/// What leads on from a state.
+type InterfaceEdges = Vec<(InterfaceAction, u32)>;
+
+/// An interface automaton. Events have the names of the subsystem's own file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct InterfaceAutomaton {
+    /// What leads on from each state.
+    edges: Vec<InterfaceEdges>,
+    /// In which of them it is down, and nobody has begun it since.
+    down: Vec<bool>,
+    start: u32,
+}
+
+impl InterfaceAutomaton {
+    /// The automaton of these states, as small as it becomes. `edges` have the states as numbers, `down` is of each.
+    pub fn new(edges: impl IntoIterator<Item = (u32, InterfaceAction, u32)>, down: Vec<bool>, start: u32) -> Self {
+        let mut whole = Self { edges: vec![Vec::new(); down.len()], down, start };
+        for (from, by, to) in edges {
+            whole.edges[from as usize].push((by, to));
+        }
+        let whole = whole.merged(&whole.silent_rounds());
+        let whole = whole.merged(&whole.passed_through());
+        let whole = whole.merged(&whole.alike());
+        whole.merged(&whole.passed_through())
+    }
+
+    /// What leads on from a state.
+    pub fn leads(&self, at: u32) -> &[(InterfaceAction, u32)] {
+        &self.edges[at as usize]
+    }
+
+    /// Whether it is down in a state, and nobody has begun it since.
+    pub fn is_down(&self, at: u32) -> bool {
+        self.down[at as usize]
+    }
+
+    /// Where it starts.
+    pub fn start(&self) -> u32 {
+        self.start
+    }
+
+    /// How many states it has.
+    pub fn len(&self) -> usize {
+        self.edges.len()
+    }
+
+    /// Of each state the number of those that it leads to and that lead back, all silently and without anything failing.
+    fn silent_rounds(&self) -> Vec<u32> {
+        let mut graph: DiGraph<(), (), u32> = DiGraph::with_capacity(self.len(), self.len());
+        for _ in &self.edges {
+            graph.add_node(());
+        }
+        for (from, edges) in self.edges.iter().enumerate() {
+            let silent = edges.iter().filter(|(by, _)| *by == InterfaceAction::Silent(Failed::Nothing));
+            for (_, to) in silent {
+                graph.add_edge(NodeIndex::new(from), NodeIndex::new(*to as usize), ());
+            }
+        }
+        let mut of = vec![0; self.len()];
+        for (number, states) in (0u32..).zip(kosaraju_scc(&graph)) {
+            states.into_iter().for_each(|state| of[state.index()] = number);
+        }
+        of
+    }
+
+    /// Of each state the number of the one that it becomes silently, where it can do nothing else.
+    fn passed_through(&self) -> Vec<u32> {
+        let next = |at: u32| match self.edges[at as usize][..] {
+            [(InterfaceAction::Silent(Failed::Nothing), to)] if self.is_down(at) == self.is_down(to) => Some(to),
+            _ => None,
+        };
+        let mut names: BTreeMap<u32, u32> = BTreeMap::new();
+        let mut of = Vec::with_capacity(self.len());
+        for at in (0u32..).take(self.len()) {
+            // There are no rounds of such steps any more.
+            let mut last = at;
+            for _ in 0..self.len() {
+                let Some(to) = next(last) else { break };
+                last = to;
+            }
+            let name = u32::try_from(names.len()).unwrap_or(u32::MAX);
+            of.push(*names.entry(last).or_insert(name));
+        }
+        of
+    }
+
+    /// Of each state the number of those that do the same (bisimilar; silent steps among them count for nothing): the coarsest partition that
+    /// is stable, by splitting. A state is looked at anew only where one that it leads to was split off.
+    fn alike(&self) -> Vec<u32> {
+        let mut before: Vec<Vec<u32>> = vec![Vec::new(); self.len()];
+        for (from, edges) in (0u32..).zip(&self.edges) {
+            edges.iter().for_each(|(_, to)| before[*to as usize].push(from));
+        }
+        let mut of: Vec<u32> = self.down.iter().map(|down| u32::from(*down)).collect();
+        // Of each block how many are in it, and what those of it do that need not be looked at.
+        let mut sizes = vec![0_usize; 2];
+        of.iter().for_each(|block| sizes[*block as usize] += 1);
+        let mut does: Vec<Option<InterfaceEdges>> = vec![None; 2];
+        let mut dirty: BTreeSet<u32> = (0u32..).zip(&of).map(|(at, _)| at).collect();
+        while !dirty.is_empty() {
+            let mut groups: BTreeMap<(u32, InterfaceEdges), Vec<u32>> = BTreeMap::new();
+            let mut looked_at: BTreeMap<u32, usize> = BTreeMap::new();
+            for at in std::mem::take(&mut dirty) {
+                let block = of[at as usize];
+                groups.entry((block, self.seen_as(at as usize, &of))).or_default().push(at);
+                *looked_at.entry(block).or_default() += 1;
+            }
+            // Where all of a block was looked at, the first of its groups keeps the name.
+            for (block, count) in looked_at {
+                if count == sizes[block as usize] {
+                    does[block as usize] = None;
+                }
+            }
+            for ((block, seen), states) in groups {
+                match &does[block as usize] {
+                    Some(known) if *known == seen => continue,
+                    Some(_) => {}
+                    None => {
+                        does[block as usize] = Some(seen);
+                        continue;
+                    }
+                }
+                let new = u32::try_from(sizes.len()).unwrap_or(u32::MAX);
+                sizes.push(states.len());
+                sizes[block as usize] -= states.len();
+                does.push(Some(seen));
+                for at in states {
+                    of[at as usize] = new;
+                    // A silent step to the rest of the block is one that counts from now on.
+                    dirty.insert(at);
+                    dirty.extend(before[at as usize].iter().copied());
+                }
+            }
+        }
+        of
+    }
+
+    /// What a state does where states are taken for one.
+    fn seen_as(&self, at: usize, of: &[u32]) -> InterfaceEdges {
+        let told = self.edges[at].iter().map(|(by, to)| (*by, of[*to as usize]));
+        let mut does: InterfaceEdges =
+            told.filter(|(by, to)| !matches!(by, InterfaceAction::Silent(_)) || *to != of[at]).collect();
+        does.sort_unstable();
+        does.dedup();
+        does
+    }
+
+    /// The same with the states of one number as one.
+    fn merged(&self, of: &[u32]) -> Self {
+        let len = of.iter().max().map_or(0, |most| *most as usize + 1);
+        let (mut edges, mut down) = (vec![InterfaceEdges::new(); len], vec![true; len]);
+        for at in 0..self.len() {
+            let into = of[at] as usize;
+            edges[into].extend(self.seen_as(at, of));
+            down[into] &= self.down[at];
+        }
+        for edges in &mut edges {
+            edges.sort_unstable();
+            edges.dedup();
+        }
+        Self { edges, down, start: of[self.start as usize] }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const WELL: InterfaceAction = InterfaceAction::Silent(Failed::Nothing);
+
+    fn name(text: &str) -> EventName {
+        EventName::new(text).unwrap()
+    }
+
+    #[test]
+    fn states_that_show_the_same_are_one_and_no_others() {
+        // Two ways of a hundred steps; at the end of one of them something is told.
+        let chain = |by: InterfaceAction, tells: Option<&str>| {
+            let mut edges = vec![(0, by, 1), (0, by, 101), (100, InterfaceAction::Tells(name("up")), 201)];
+            edges.extend((1..100).chain(101..200).map(|at| (at, by, at + 1)));
+            edges.extend(tells.map(|event| (201, InterfaceAction::Tells(name(event)), 0)));
+            InterfaceAutomaton::new(edges, vec![false; 202], 0).len()
+        };
+        // The start, what tells, and what leads nowhere.
+        assert_eq!(chain(WELL, None), 3);
+        assert_eq!(chain(WELL, Some("down")), 4);
+        // Where something fails in each step they differ, by what has failed before.
+        assert_eq!(chain(InterfaceAction::Silent(Failed::Apply), None), 102);
+    }
+
+    #[test]
+    fn silent_rounds_are_one_state() {
+        let edges = [(0, WELL, 1), (1, WELL, 2), (2, WELL, 0), (1, InterfaceAction::Tells(name("up")), 3)];
+        let whole = InterfaceAutomaton::new(edges, vec![false; 4], 0);
+        assert_eq!((whole.len(), whole.leads(whole.start()).len()), (2, 1), "{whole:?}");
+    }
+}

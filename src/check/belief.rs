@@ -1,0 +1,218 @@
+//! What is known of a subsystem by what its parent has raised and heard: in which states of its interface automaton it may be (its belief
+//! state), found on demand.
+//!
+//! What the parent raises lies in the subsystem's inbox for a while, so a belief has pairs of a state and of what is still to be taken. What
+//! the subsystem tells is heard at once: told earlier and heard only now, it might as well have been told now, since whatever the subsystem
+//! took before it told that was raised before.
+
+use super::automaton::{InterfaceAction, InterfaceAutomaton};
+use super::state::Failed;
+use crate::model::{EventName, Precedence, precedence::taken_first};
+use indexmap::IndexSet;
+use rustc_hash::{FxBuildHasher, FxHashMap};
+use smallvec::SmallVec;
+use std::cmp::Reverse;
+use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
+use std::rc::Rc;
+use std::sync::Arc;
+
+/// So many events of a parent lie in a subsystem's inbox at once; it takes the first of them before one more comes.
+const MOST_UNTAKEN: usize = 3;
+
+/// A state that it may be in, and what it has not taken yet: places among the events that it takes, from 1 on.
+type Possible = (u32, [u8; MOST_UNTAKEN]);
+
+/// What a subsystem may tell, each with what must have failed in it and with what is known when that was heard: of ways on which less fails
+/// nothing more is told.
+pub type MayTell = Rc<[(EventName, Failed, u32)]>;
+
+/// What may be, each with what must have failed since something was told, at least.
+type Belief = Rc<[(Possible, Failed)]>;
+
+/// What may be known of a subsystem. Known things are numbers from 0 (the start) on.
+#[derive(Debug, Clone)]
+pub struct Beliefs {
+    automaton: Arc<InterfaceAutomaton>,
+    /// What its parent waits for; what else it tells is nothing to see.
+    heard: BTreeSet<EventName>,
+    takes: Vec<(EventName, Precedence)>,
+    sets: IndexSet<Belief, FxBuildHasher>,
+    tells: FxHashMap<u32, MayTell>,
+    raised: FxHashMap<(u32, u8), (u32, bool)>,
+}
+
+impl Beliefs {
+    /// Nothing was raised yet. `takes`: what the parent may raise, and what of that goes first; by the names of the subsystem's own file, like `heard`.
+    pub fn new(
+        automaton: Arc<InterfaceAutomaton>,
+        takes: Vec<(EventName, Precedence)>,
+        heard: BTreeSet<EventName>,
+    ) -> Self {
+        let start = automaton.start();
+        let (sets, tells, raised) = (IndexSet::default(), FxHashMap::default(), FxHashMap::default());
+        let mut beliefs = Self { automaton, heard, takes, sets, tells, raised };
+        beliefs.of([((start, [0; MOST_UNTAKEN]), Failed::Nothing)]);
+        beliefs
+    }
+
+    /// What it may tell now.
+    pub fn tells(&mut self, belief: u32) -> MayTell {
+        if let Some(known) = self.tells.get(&belief) {
+            return known.clone();
+        }
+        let mut after: BTreeMap<(EventName, Failed), Vec<(Possible, Failed)>> = BTreeMap::new();
+        for ((state, untaken), failed) in self.sets[belief as usize].iter() {
+            for (by, to) in self.automaton.leads(*state) {
+                if let InterfaceAction::Tells(event) = by
+                    && self.heard.contains(event)
+                {
+                    after.entry((*event, *failed)).or_default().push(((*to, *untaken), Failed::Nothing));
+                }
+            }
+        }
+        let tells: MayTell =
+            after.into_iter().map(|((event, failed), those)| (event, failed, self.of(those))).collect();
+        self.tells.insert(belief, tells.clone());
+        tells
+    }
+
+    /// Its parent raises an event: what is known then, and whether that comes to nothing for sure where something is expected of it.
+    pub fn raised(&mut self, belief: u32, event: EventName) -> (u32, bool) {
+        let Some(at) = self.takes.iter().position(|(takes, _)| *takes == event) else { return (belief, false) };
+        let number = u8::try_from(at + 1).unwrap_or(u8::MAX);
+        if let Some(known) = self.raised.get(&(belief, number)) {
+            return *known;
+        }
+        let before = self.sets[belief as usize].clone();
+        let after = before.iter().filter_map(|((state, untaken), failed)| {
+            let mut untaken = *untaken;
+            *untaken.iter_mut().find(|place| **place == 0)? = number;
+            Some(((*state, untaken), *failed))
+        });
+        // Where something has failed nobody can tell.
+        let well = || before.iter().filter(|(_, failed)| *failed == Failed::Nothing).map(|(possible, _)| possible);
+        let heeds = |(state, untaken): &Possible| {
+            let mut takes = self.automaton.leads(*state).iter();
+            untaken[0] != 0 || takes.any(|(by, _)| *by == InterfaceAction::Takes { event, heeded: true })
+        };
+        let down = |(state, _): &Possible| self.automaton.is_down(*state);
+        let lost = !well().any(|possible| heeds(possible) || down(possible));
+        let known = (self.of(after.collect::<Vec<_>>()), lost);
+        self.raised.insert((belief, number), known);
+        known
+    }
+
+    /// What is known where it is in one of these, or silently got on from there.
+    fn of(&mut self, some: impl IntoIterator<Item = (Possible, Failed)>) -> u32 {
+        let mut met: FxHashMap<Possible, Failed> = FxHashMap::default();
+        let mut open: BinaryHeap<Reverse<(Failed, Possible)>> =
+            some.into_iter().map(|(possible, failed)| Reverse((failed, possible))).collect();
+        // What less fails in comes first.
+        while let Some(Reverse((failed, possible))) = open.pop() {
+            if met.contains_key(&possible) {
+                continue;
+            }
+            met.insert(possible, failed);
+            let (state, untaken) = possible;
+            let taken = self.taken(untaken);
+            for (by, to) in self.automaton.leads(state) {
+                match by {
+                    InterfaceAction::Silent(class) => open.push(Reverse((failed.max(*class), (*to, untaken)))),
+                    InterfaceAction::Tells(event) if self.heard.contains(event) => {}
+                    InterfaceAction::Tells(_) => open.push(Reverse((failed, (*to, untaken)))),
+                    InterfaceAction::Takes { event, .. } => {
+                        let rest = taken.iter().filter(|(taken, _)| taken == event);
+                        open.extend(rest.map(|(_, rest)| Reverse((failed, (*to, *rest)))));
+                    }
+                }
+            }
+        }
+        let mut set: Vec<(Possible, Failed)> = met.into_iter().collect();
+        set.sort_unstable();
+        let set: Belief = set.into();
+        u32::try_from(self.sets.insert_full(set).0).unwrap_or(u32::MAX)
+    }
+
+    /// What it may take next of what it has not taken, each with what is left then: of some of it the rest may not have come yet.
+    fn taken(&self, untaken: [u8; MOST_UNTAKEN]) -> SmallVec<[(EventName, [u8; MOST_UNTAKEN]); 1]> {
+        let takes = |place: &u8| self.takes.get(usize::from(*place).wrapping_sub(1)).copied();
+        let came: SmallVec<[(EventName, Precedence); MOST_UNTAKEN]> = untaken.iter().map_while(takes).collect();
+        let mut all: SmallVec<[(EventName, [u8; MOST_UNTAKEN]); 1]> = SmallVec::new();
+        for some in 1..=came.len() {
+            let first = taken_first(&came[..some]);
+            let Some(event) = first.first().map(|at| came[*at].0) else { continue };
+            let mut rest = [0; MOST_UNTAKEN];
+            let left = untaken.iter().enumerate().filter(|(at, _)| !first.contains(at));
+            rest.iter_mut().zip(left).for_each(|(place, (_, left))| *place = *left);
+            if !all.contains(&(event, rest)) {
+                all.push((event, rest));
+            }
+        }
+        all
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn name(text: &str) -> EventName {
+        EventName::new(text).unwrap()
+    }
+
+    /// Begun it tells that it is up; ended, that it is down; anything else comes to nothing.
+    fn beliefs() -> Beliefs {
+        let takes = |event: &str, heeded| InterfaceAction::Takes { event: name(event), heeded };
+        let tells = |event: &str| InterfaceAction::Tells(name(event));
+        let silent = InterfaceAction::Silent;
+        let edges = [
+            (0, takes("e_start", true), 1),
+            (0, takes("e_shutdown", false), 0),
+            (1, silent(Failed::Nothing), 2),
+            (1, silent(Failed::Apply), 5),
+            (2, tells("up"), 3),
+            (3, takes("e_shutdown", true), 4),
+            (3, takes("e_start", false), 3),
+            (4, tells("down"), 0),
+            (5, tells("failed"), 3),
+        ];
+        let down = vec![true, false, false, false, false, false];
+        let takes = vec![(name("e_start"), Precedence::UrgentAsLast), (name("e_shutdown"), Precedence::UrgentAsLast)];
+        let heard = ["up", "down", "failed"].map(name).into();
+        Beliefs::new(Arc::new(InterfaceAutomaton::new(edges, down, 0)), takes, heard)
+    }
+
+    fn told(beliefs: &mut Beliefs, belief: u32) -> Vec<(String, Failed)> {
+        beliefs.tells(belief).iter().map(|(event, failed, _)| (event.to_string(), *failed)).collect()
+    }
+
+    #[test]
+    fn what_is_told_comes_in_its_order_and_by_what_fails() {
+        let mut of = beliefs();
+        assert!(told(&mut of, 0).is_empty(), "nobody has begun it");
+        let (begun, _) = of.raised(0, name("e_start"));
+        let expected = [("failed".to_owned(), Failed::Apply), ("up".to_owned(), Failed::Nothing)];
+        assert_eq!(told(&mut of, begun), expected);
+        let up = of.tells(begun)[1].2;
+        assert!(told(&mut of, up).is_empty(), "once");
+        let (ended, _) = of.raised(up, name("e_shutdown"));
+        assert_eq!(told(&mut of, ended), [("down".to_owned(), Failed::Nothing)]);
+        assert_eq!(of.tells(ended)[0].2, 0, "as at the start");
+    }
+
+    #[test]
+    fn what_is_raised_waits_until_it_is_taken_and_may_come_to_nothing() {
+        let mut of = beliefs();
+        assert!(!of.raised(0, name("e_shutdown")).1, "nobody has begun it: nothing is expected");
+        let (begun, _) = of.raised(0, name("e_start"));
+        // It is ended before it has told that it is up: that waits behind it.
+        let (ended, lost) = of.raised(begun, name("e_shutdown"));
+        assert!(!lost);
+        assert_eq!(told(&mut of, ended).last(), Some(&("up".to_owned(), Failed::Nothing)));
+        let up = of.tells(ended)[1].2;
+        assert_eq!(told(&mut of, up), [("down".to_owned(), Failed::Nothing)]);
+        let (begun, _) = of.raised(0, name("e_start"));
+        let up = of.tells(begun)[1].2;
+        assert!(of.raised(up, name("e_start")).1, "it is up, and takes no second one");
+    }
+}

@@ -1,0 +1,192 @@
+//! The interface automaton of a file, of what was followed of it: what its parent raises and what it tells, and nothing else.
+//!
+//! What a parent is told without anybody writing it (*up*, *failed*, *down*, *stranded*) is told by the rule by which a running deployment tells
+//! it; times that are over may be over at any moment.
+
+use super::automaton::{InterfaceAction, InterfaceAutomaton};
+use super::explore::{Edge, Graph};
+use super::product::Product;
+use super::reactions::triggers;
+use super::shared_list::SharedList;
+use super::state::{Failed, Move, ProductState};
+use crate::model::subsystem::{IGNORED, SeenStanding, standing};
+use crate::model::{Deployment, EventName, SubsystemStanding};
+use crate::statechart::EventId;
+use indexmap::IndexMap;
+use rustc_hash::{FxBuildHasher, FxHashMap};
+use std::collections::BTreeSet;
+
+/// What a parent and a subsystem have to do with each other. Events have the names of the subsystem's own file.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct ParentInterface {
+    /// What the parent raises of what it accepts.
+    pub raises: BTreeSet<EventName>,
+    /// What the parent waits for of what it tells.
+    pub hears: BTreeSet<EventName>,
+}
+
+/// Where a subsystem is: a state of the product, what was told last, and whether it was told to go down and is not yet.
+type Place = (u32, Option<SubsystemStanding>, bool);
+
+/// What is made of a graph.
+struct Deriving<'g, 'p, 'a> {
+    graph: &'g Graph<'p, 'a>,
+    parent: &'g ParentInterface,
+    begins: EventName,
+    ends: EventName,
+    seen: FxHashMap<u32, SeenStanding>,
+    places: IndexMap<Place, u32, FxBuildHasher>,
+    /// Of each state of the automaton whether it is down.
+    down: Vec<bool>,
+    edges: Vec<(u32, InterfaceAction, u32)>,
+}
+
+impl Graph<'_, '_> {
+    /// What these coordinators, which are all of a file, show its parent.
+    pub(super) fn derived(&self, parent: &ParentInterface) -> InterfaceAutomaton {
+        let deployment: &Deployment = self.product.deployment;
+        let (begins, ends) = (deployment.deploy.event, deployment.shutdown.event);
+        let (seen, places) = (FxHashMap::default(), IndexMap::default());
+        let (down, edges) = (Vec::new(), Vec::new());
+        let mut deriving = Deriving { graph: self, parent, begins, ends, seen, places, down, edges };
+        let start = deriving.at((0, Some(SubsystemStanding::Down), false));
+        let mut next = 0;
+        while let Some((place, number)) = deriving.places.get_index(next).map(|(place, number)| (*place, *number)) {
+            next += 1;
+            deriving.standings(place, number);
+            deriving.moves(place, number);
+        }
+        InterfaceAutomaton::new(deriving.edges, deriving.down, start)
+    }
+}
+
+impl Deriving<'_, '_, '_> {
+    /// The number of the automaton's state for that.
+    fn at(&mut self, place: Place) -> u32 {
+        if let Some(known) = self.places.get(&place) {
+            return *known;
+        }
+        let number = self.fresh(place.1 == Some(SubsystemStanding::Down));
+        self.places.insert(place, number);
+        number
+    }
+
+    fn fresh(&mut self, down: bool) -> u32 {
+        self.down.push(down);
+        u32::try_from(self.down.len() - 1).unwrap_or(u32::MAX)
+    }
+
+    /// What is told by itself.
+    fn standings(&mut self, (state, told, ending): Place, number: u32) {
+        let product = &*self.graph.product;
+        let seen = *self.seen.entry(state).or_insert_with(|| product.seen_as_one(&self.graph.states[state as usize]));
+        let late = SeenStanding { late: told.is_none(), stranded: ending, ..seen };
+        let (in_time, late) = (standing(told, seen), standing(told, late));
+        for now in in_time.into_iter().chain(late.filter(|late| in_time != Some(*late))) {
+            let still = ending && now != SubsystemStanding::Down;
+            let to = self.at((state, Some(now), still));
+            self.tells(number, Failed::Nothing, &[now.own_event()], to);
+        }
+    }
+
+    /// What its moves show.
+    fn moves(&mut self, (state, told, ending): Place, number: u32) {
+        let graph = self.graph;
+        let at = &graph.states[state as usize];
+        if graph.product.worlds.top(at.world).is_some() && graph.product.is_down(at) {
+            // What is left is taken away by force, and it is as at the start.
+            let to = self.at((0, told, ending));
+            self.edges.push((number, InterfaceAction::Silent(Failed::Nothing), to));
+            return;
+        }
+        let mut taken: BTreeSet<EventName> = BTreeSet::new();
+        for edge in graph.outgoing().of(state) {
+            let by = &graph.edges[*edge as usize];
+            let tells = graph.told.get(edge).cloned().unwrap_or_default();
+            let names = self.brought(by);
+            if names.is_empty() {
+                let to = self.at((by.to, told, ending));
+                self.tells(number, by.failed, &tells, to);
+            }
+            for name in names {
+                let to = self.at((by.to, self.after(told, name), self.is_ending(ending, name)));
+                if !self.parent.raises.contains(&name) {
+                    self.tells(number, by.failed, &tells, to);
+                    continue;
+                }
+                taken.insert(name);
+                self.takes(number, name, !by.dropped, &tells, to);
+            }
+        }
+        if graph.followed[state as usize] && at.inbox.is_empty() && at.in_transit.is_empty() {
+            for name in self.parent.raises.difference(&taken).copied().collect::<Vec<_>>() {
+                // Where one would take it, and so many requests wait that it was not followed, it waits as well.
+                if !graph.product.defers(at, name) {
+                    let to = self.at((state, self.after(told, name), self.is_ending(ending, name)));
+                    self.takes(number, name, false, &SharedList::new(), to);
+                }
+            }
+        }
+    }
+
+    /// What was told last when it has taken an event up.
+    fn after(&self, told: Option<SubsystemStanding>, event: EventName) -> Option<SubsystemStanding> {
+        told.filter(|told| event != self.begins || *told != SubsystemStanding::Down)
+    }
+
+    fn is_ending(&self, ending: bool, event: EventName) -> bool {
+        event == self.ends || ending && event != self.begins
+    }
+
+    /// The events of its parent, or that might as well be, that an edge brings; empty: none.
+    fn brought(&self, edge: &Edge) -> Vec<EventName> {
+        let (Move::Event(at) | Move::Dropped(at)) = self.graph.by(edge) else { return Vec::new() };
+        self.graph.product.alike_to(at).collect()
+    }
+
+    /// It takes an event, and tells what comes of that.
+    fn takes(&mut self, from: u32, event: EventName, heeded: bool, tells: &SharedList<EventName>, to: u32) {
+        let ignored = (!heeded).then(|| EventName::new(&format!("{event}{IGNORED}")).ok()).flatten();
+        let tells: Vec<EventName> = ignored.into_iter().chain(tells.iter().copied()).collect();
+        let taken = match tells.iter().any(|event| self.parent.hears.contains(event)) {
+            true => self.fresh(false),
+            false => to,
+        };
+        self.edges.push((from, InterfaceAction::Takes { event, heeded }, taken));
+        if taken != to {
+            self.tells(taken, Failed::Nothing, &tells, to);
+        }
+    }
+
+    /// It tells these one after the other, as far as its parent waits for them, when this has failed.
+    fn tells(&mut self, from: u32, class: Failed, events: &[EventName], to: u32) {
+        let told: Vec<EventName> = events.iter().filter(|event| self.parent.hears.contains(event)).copied().collect();
+        let Some((last, before)) = told.split_last() else {
+            self.edges.push((from, InterfaceAction::Silent(class), to));
+            return;
+        };
+        let mut at = from;
+        if class != Failed::Nothing {
+            at = self.fresh(false);
+            self.edges.push((from, InterfaceAction::Silent(class), at));
+        }
+        for event in before {
+            let next = self.fresh(false);
+            self.edges.push((at, InterfaceAction::Tells(*event), next));
+            at = next;
+        }
+        self.edges.push((at, InterfaceAction::Tells(*last), to));
+    }
+}
+
+impl Product<'_> {
+    /// Whether a coordinator waits for an event where so many of its requests wait that what comes is not followed.
+    fn defers(&self, state: &ProductState, name: EventName) -> bool {
+        let waits = |number: usize| {
+            let chart = self.members[number].chart;
+            let event = chart.event(name);
+            event != EventId::OTHER && triggers(chart, state.leaves[number]).0.contains(&event)
+        };
+        (0..self.members.len()).any(|number| self.is_busy(state, number) && waits(number))
+    }
+}

@@ -1,0 +1,93 @@
+//! A parent is followed against what its subsystems may tell, in the order in which they tell it.
+
+use super::composed::{catalogue, files, found, load};
+use davit::check::{self, CheckVerdict};
+use davit::model::{Finding, Severity};
+
+/// A parent of one arm.
+pub const SOLO: &str = "davit: 1
+name: solo
+platform: simulated
+types: {}
+subsystems: { left: { deployment: arm.yaml } }
+configurations: [solo_conf.lua]
+coordinator: solo.lua
+deploy: { event: e_start, up: on, within_s: 10 }
+shutdown: { event: e_shutdown, down: idle, within_s: 10 }
+";
+pub const SOLO_CONF: &str = "ConfiguratorConf { stiff = Configuration { property_set('left.k', 2.0) } }";
+/// It touches the arm where that wants to leave before it has said that it is built, which it never does.
+pub const SOLO_COORDINATOR: &str = "return state {
+  idle = state {}, raising = state { entry = 'left/e_start' }, built = state {}, on = state {},
+  odd = state { entry = 'stiff' }, even = state { entry = 'stiff.undo' },
+  lowering = state { entry = { 'left/e_shutdown', 'left/e_released' } },
+  trans { src = 'initial', tgt = 'idle' },
+  trans { src = 'idle', tgt = 'raising', events = { 'e_start' } },
+  trans { src = 'raising', tgt = 'built', events = { 'left/e_built' } },
+  trans { src = 'raising', tgt = 'odd', events = { 'left/e_leaving' } },
+  trans { src = 'raising', tgt = 'lowering', events = { 'e_shutdown' } },
+  trans { src = 'built', tgt = 'on', events = { 'left/up' } },
+  trans { src = 'built', tgt = 'lowering', events = { 'e_shutdown', 'left/e_leaving' } },
+  trans { src = 'on', tgt = 'lowering', events = { 'e_shutdown', 'left/e_leaving' } },
+  trans { src = 'odd', tgt = 'even', events = { 'stiff.ok' } },
+  trans { src = 'even', tgt = 'lowering', events = { 'stiff.undone' } },
+  trans { src = 'lowering', tgt = 'idle', events = { 'left/down' } },
+}";
+
+fn solo(changes: &[(&str, &str, &str)]) -> Vec<Finding> {
+    let loaded = load(&files(changes), "solo.yaml", &[]);
+    let deployment = loaded.deployment.unwrap_or_else(|| panic!("{:#?}", loaded.findings));
+    let catalogue = catalogue(&deployment);
+    check::run(deployment, &catalogue).findings
+}
+
+fn with(findings: &[Finding], code: &str, severity: Severity) -> Vec<String> {
+    let of = findings.iter().filter(|finding| finding.code.0 == code && finding.severity == severity);
+    of.map(|finding| format!("{} {}", finding.message, finding.help.clone().unwrap_or_default())).collect()
+}
+
+#[test]
+fn what_never_comes_in_that_order_refuses_nothing() {
+    let touches = |changes: &[(&str, &str, &str)]| with(&solo(changes), "compose::promise", Severity::Error);
+    assert!(touches(&[]).is_empty(), "{:?}", touches(&[]));
+    // One that does say so first.
+    let first = ("arm.lua", "making = state { entry = 'make' }", "making = state { entry = { 'e_leaving', 'make' } }");
+    let says = touches(&[first]);
+    assert!(says.len() == 1 && says[0].contains("`stiff` is asked for where"), "{says:?}");
+}
+
+#[test]
+fn what_a_subsystem_told_where_nobody_waited_is_not_told_again() {
+    let stuck = |changes: &[(&str, &str, &str)]| with(&found(changes), "coord::stuck", Severity::Warning);
+    assert!(stuck(&[]).is_empty(), "{:?}", stuck(&[]));
+    // `left/down` may come before `right/e_leaving`, while nobody waits for it.
+    let missed = [
+        (
+            "pair.lua",
+            "lowering = state { entry = { 'left/e_shutdown', 'right/e_shutdown', 'left/e_released', 'right/e_released' } },",
+            "lowering = state { entry = { 'left/e_shutdown', 'left/e_released', 'right/e_shutdown' } }, freeing = state { entry = 'right/e_released' },",
+        ),
+        (
+            "pair.lua",
+            "trans { src = 'lowering', tgt = 'lone', events = { 'left/down' } },",
+            "trans { src = 'lowering', tgt = 'freeing', events = { 'right/e_leaving' } },
+  trans { src = 'freeing', tgt = 'lone', events = { 'left/down' } },",
+        ),
+        ("pair.lua", "trans { src = 'lowering', tgt = 'ltwo'", "trans { src = 'freeing', tgt = 'ltwo'"),
+    ];
+    let says = stuck(&missed);
+    assert!(
+        says.iter().any(|says| says.contains("`root.ltwo`") && says.contains("`left/down` may have been told before")),
+        "{says:?}"
+    );
+}
+
+#[test]
+fn a_composition_that_waits_where_things_are_told_is_sound() {
+    let loaded = load(&files(&[]), "pair.yaml", &[]);
+    let deployment = loaded.deployment.unwrap_or_else(|| panic!("{:#?}", loaded.findings));
+    let catalogue = catalogue(&deployment);
+    let report = check::run(deployment, &catalogue);
+    let warned = report.findings.iter().filter(|finding| finding.severity > Severity::Info).count();
+    assert_eq!((warned, report.verdict), (0, CheckVerdict::Sound), "{:#?} {:#?}", report.findings, report.left);
+}
