@@ -44,13 +44,6 @@ pub struct Args {
 
 impl Run for Args {
     fn run(self, context: &CommandContext) -> CommandResult {
-        let json = self.json;
-        self.show(context).map_err(|failure| failure.in_json(json))
-    }
-}
-
-impl Args {
-    fn show(self, context: &CommandContext) -> CommandResult {
         if self.follow {
             return self.follow(context);
         }
@@ -71,7 +64,9 @@ impl Args {
         }
         Ok(Exit::Done)
     }
+}
 
+impl Args {
     /// How many entries are asked for: all, where only some of them are shown.
     fn at_most(&self) -> Option<usize> {
         self.last.filter(|_| !self.is_sifted())
