@@ -78,6 +78,24 @@ pub struct PlannedStep {
     pub origin: Origin,
 }
 
+impl PlannedStep {
+    /// A step that is done for itself: nothing undoes it.
+    pub fn bare(step: Step, id: StepId, wave: u32, after: SmallVec<[StepId; 4]>) -> Self {
+        Self {
+            id,
+            stage: PlanStage::Changes,
+            wave,
+            after,
+            step,
+            reversibility: Reversibility::Exact,
+            undo: Undo::Nothing,
+            moves: false,
+            undo_moves: false,
+            origin: Origin::NONE,
+        }
+    }
+}
+
 /// What a slot held before an absolute write.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SavedValue {

@@ -51,11 +51,10 @@ pub fn read(cx: &mut Cx, reading: Reading, params: &mut Params, stem: &str, load
         cx.refuse(finding.help("only texts are read: give the source file"));
         return None;
     }
-    let mut recorder = Recorder::new(std::mem::take(cx), reading, std::mem::take(params));
-    recorder.loads = loads;
+    let recorder = Recorder::new(std::mem::take(cx), reading, std::mem::take(params), loads);
     let shared: SharedRecorder = Rc::new(RefCell::new(recorder));
     let outcome = run(&shared, &text);
-    let mut recorder = std::mem::replace(&mut *shared.borrow_mut(), Recorder::empty(reading));
+    let mut recorder = shared.take();
     let ran = match outcome {
         Ok(returned) => {
             if let Some(exhausted) = recorder.exhausted.take() {
