@@ -1,7 +1,6 @@
 //! What the commands that talk to a running deployment share: finding it, asking it, telling why not.
 
 use super::CommandFailure;
-use super::exit::Exit;
 use super::kept;
 use crate::limits;
 use crate::model::Ident;

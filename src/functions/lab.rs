@@ -54,8 +54,3 @@ impl Lab {
     }
 }
 
-impl std::fmt::Debug for Lab {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("Lab")
-    }
-}

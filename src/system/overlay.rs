@@ -4,7 +4,7 @@
 use super::node::{ComponentNode, Driven};
 use super::system_graph::snapshot_of;
 use super::{System, View, ViewMut};
-use crate::model::{Catalogue, ComponentName, MemberRef, Policy, RunState, Snapshot, Value};
+use crate::model::{Catalogue, ComponentName, MemberRef, Policy, Snapshot};
 use rustc_hash::FxHashMap;
 
 /// A system with changes laid over it.

@@ -110,8 +110,3 @@ impl Signal {
     }
 }
 
-impl std::fmt::Debug for Signal {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "Signal({})", if self.is_set() { "set" } else { "not set" })
-    }
-}

@@ -10,7 +10,7 @@ use crate::plan::backwards::Backwards;
 use crate::plan::{PlannedStep, StepId};
 use crate::stack::Reason;
 use crate::system::touch::components;
-use crate::system::{Overlay, Reversibility, System, Undo, View, diff, step};
+use crate::system::{Overlay, System, Undo, View, diff, step};
 use rustc_hash::FxHashSet;
 use smallvec::SmallVec;
 

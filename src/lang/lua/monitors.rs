@@ -3,7 +3,7 @@
 use super::constructors::of_a_table;
 use super::recorder::{Recorder, SharedRecorder};
 use super::{convert, sandbox};
-use crate::lang::tree::{Entry, Kind, Node};
+use crate::lang::tree::{Kind, Node};
 use crate::lang::words::{self, CONDITIONS, SIGNALS, Word};
 use crate::limits;
 use crate::model::{Finding, codes};
