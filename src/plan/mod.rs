@@ -50,6 +50,17 @@ pub enum PlanStage {
     Post,
 }
 
+impl PlanStage {
+    /// As it is shown.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Pre => "pre",
+            Self::Changes => "changes",
+            Self::Post => "post",
+        }
+    }
+}
+
 /// The number of a step inside its plan or transaction: its place in the list.
 pub type StepId = u32;
 
