@@ -109,4 +109,3 @@ impl Signal {
         self.inner.set.load(Ordering::SeqCst)
     }
 }
-
