@@ -193,6 +193,12 @@ impl CoordinatorHandle {
     }
 }
 
+impl std::fmt::Debug for CoordinatorHandle {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Coordinator").field("leaf", &self.leaf()).field("detached", &self.is_detached()).finish()
+    }
+}
+
 impl CoordinatorShared {
     fn leaf(&self) -> Option<NodeId> {
         let number = self.leaf.load(Ordering::SeqCst).checked_sub(1)?;

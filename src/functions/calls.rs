@@ -22,6 +22,12 @@ pub struct Functions {
     pub(super) bound: Rc<BoundMachine>,
 }
 
+impl std::fmt::Debug for Functions {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Functions").field("count", &self.bound.tables().functions()).finish()
+    }
+}
+
 impl Functions {
     /// Calls a step hook with the table of the step's events. `false`: it raised an error that ends the step.
     fn step_hook(&self, field: &LuaString, view: &mut HookContext<'_>) -> bool {

@@ -103,9 +103,4 @@ impl Signal {
     pub(super) fn clear(&self) {
         self.inner.set.store(false, Ordering::SeqCst);
     }
-
-    /// Whether the flag is set.
-    pub fn is_set(&self) -> bool {
-        self.inner.set.load(Ordering::SeqCst)
-    }
 }
