@@ -155,5 +155,6 @@ pub static TRANSITION: Object = Object {
         )
         .without("0"),
         DOC,
-    ],    ..Object::BARE
+    ],
+    ..Object::BARE
 };

@@ -118,7 +118,8 @@ pub static CONFIGURATION: Object = Object {
             "description = \"what it is for\"",
             ("description: 1", TEXT_WRONG_TYPE),
         ),
-    ],    ..Object::BARE
+    ],
+    ..Object::BARE
 };
 
 /// What must come after a configuration.
@@ -264,7 +265,8 @@ static REPLACE: Object = Object {
             ("map: { force: 1 }", TEXT_WRONG_TYPE),
         )
         .without("each port keeps its name"),
-    ],    ..Object::BARE
+    ],
+    ..Object::BARE
 };
 
 static DESTROY: Object = Object {
@@ -294,7 +296,8 @@ static CONNECT: Object = Object {
             ("policy: fifo", TEXT_BAD_VALUE),
         )
         .without("`data`"),
-    ],    ..Object::BARE
+    ],
+    ..Object::BARE
 };
 
 /// The policy of a queue.

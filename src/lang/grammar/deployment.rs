@@ -218,7 +218,8 @@ pub static DEPLOYMENT: Object = Object {
             "faults: [{ step: \"property_set a.k\", how: fail }]",
             ("faults: { step: \"start a\", how: fail }", TEXT_WRONG_TYPE),
         ),
-    ],    ..Object::BARE
+    ],
+    ..Object::BARE
 };
 
 /// What is open to functions.
@@ -269,7 +270,8 @@ pub static ACTIVITY: Object = Object {
             ("cpu: -1", TEXT_BAD_VALUE),
         )
         .without("any"),
-    ],    ..Object::BARE
+    ],
+    ..Object::BARE
 };
 
 /// The way up.
@@ -380,7 +382,8 @@ pub static LIMITS: Object = Object {
             ("step_timeout_s: -1", TEXT_BAD_TIME),
         )
         .without("1 s"),
-    ],    ..Object::BARE
+    ],
+    ..Object::BARE
 };
 
 /// What simulated components do.
@@ -464,5 +467,6 @@ pub static FAULT: Object = Object {
         .without("1"),
         key("takes_s", Form::Seconds, "How long a step takes that is `slow`: required there, and refused of any other.", "takes_s: 0.5", ("takes_s: 0", TEXT_BAD_TIME))
             .beside("how: slow"),
-    ],    ..Object::BARE
+    ],
+    ..Object::BARE
 };

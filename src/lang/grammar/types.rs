@@ -94,7 +94,8 @@ pub static TYPE: Object = Object {
             "exclusive: [can0]",
             ("exclusive: 1", TEXT_WRONG_TYPE),
         ),
-    ],    ..Object::BARE
+    ],
+    ..Object::BARE
 };
 
 /// A port.
@@ -131,7 +132,8 @@ pub static PORT: Object = Object {
         )
         .without("`false`: it is a note where nothing does"),
         doc("doc: the force on the tool"),
-    ],    ..Object::BARE
+    ],
+    ..Object::BARE
 };
 
 /// A property.
@@ -216,7 +218,8 @@ pub static OPERATION: Object = Object {
         )
         .without("the answer counts"),
         doc("doc: moves the arm to its rest"),
-    ],    ..Object::BARE
+    ],
+    ..Object::BARE
 };
 
 /// An operation that another one undoes.
