@@ -234,15 +234,15 @@ fn run(extensions: Extensions) -> ExitCode {
     if matches!(cli.command, Command::Deploy(_) | Command::Run(_))
         && let Err(error) = last_words::prepare()
     {
-        return tell(context.out, deploy::short(error), Answers::Text).into();
+        return tell(context.out, deploy::short(error), FailureAnswer::Text).into();
     }
     let answers = match &cli.command {
-        _ if !json => Answers::Text,
+        _ if !json => FailureAnswer::Text,
         // Their help promises one object a line.
-        Command::Deploy(_) | Command::Run(_) | Command::Sim(_) | Command::Monitor(_) => Answers::JsonLine,
-        Command::Watch(_) => Answers::JsonLine,
-        Command::Log(log) if log.streams() => Answers::JsonLine,
-        _ => Answers::Json,
+        Command::Deploy(_) | Command::Run(_) | Command::Sim(_) | Command::Monitor(_) => FailureAnswer::JsonLine,
+        Command::Watch(_) => FailureAnswer::JsonLine,
+        Command::Log(log) if log.streams() => FailureAnswer::JsonLine,
+        _ => FailureAnswer::Json,
     };
     let ran = catch_unwind(AssertUnwindSafe(|| cli.command.run(&context)));
     let exit = match ran {
@@ -261,21 +261,21 @@ fn run(extensions: Extensions) -> ExitCode {
 
 /// How a failure is answered: as `{"ok":false,"findings":[…]}` by every command that was asked with `--json`.
 #[derive(Clone, Copy)]
-enum Answers {
+enum FailureAnswer {
     Text,
     Json,
     JsonLine,
 }
 
 /// Prints why a command did not do its work; answers how it ended.
-fn tell(out: Output, failure: CommandFailure, answers: Answers) -> Exit {
+fn tell(out: Output, failure: CommandFailure, answers: FailureAnswer) -> Exit {
     let CommandFailure { exit, findings, sources } = failure;
     last_words::say(move || {
         let answer = || serde_json::json!({ "ok": false, "findings": to_json(&findings, &sources) });
         match answers {
-            Answers::Text => out.findings(&findings, &sources),
-            Answers::Json => out.json(&answer()),
-            Answers::JsonLine => out.json_line(&answer()),
+            FailureAnswer::Text => out.findings(&findings, &sources),
+            FailureAnswer::Json => out.json(&answer()),
+            FailureAnswer::JsonLine => out.json_line(&answer()),
         }
     });
     exit
@@ -289,7 +289,7 @@ fn written(out: Output, exit: Exit) -> Exit {
         format!("the output could not be written: {why}"),
         "make room where the output goes, or send it elsewhere",
     );
-    let unwritten = tell(out, failure, Answers::Text);
+    let unwritten = tell(out, failure, FailureAnswer::Text);
     if exit == Exit::Done { unwritten } else { exit }
 }
 

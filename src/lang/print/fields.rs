@@ -8,7 +8,7 @@ use crate::model::{Configuration, Monitor, OnFailure, Origin, StateList, Value};
 use std::fmt::Write as _;
 
 /// A key with what stands behind it.
-pub type Field = (&'static str, String);
+pub type WrittenKey = (&'static str, String);
 
 /// A text in quotes where the language wants them.
 pub fn text(t: &str, language: Language) -> String {
@@ -66,7 +66,7 @@ pub fn table<'k>(fields: impl IntoIterator<Item = (&'k str, String)>, language: 
 }
 
 /// Keys with their values, each in a line of its own.
-pub fn lines(out: &mut String, pad: &str, fields: Vec<Field>, language: Language) {
+pub fn lines(out: &mut String, pad: &str, fields: Vec<WrittenKey>, language: Language) {
     for (key, value) in fields {
         _ = match language {
             Language::Lua => writeln!(out, "{pad}{key} = {value},"),
@@ -80,7 +80,7 @@ pub fn of_configuration(
     c: &Configuration,
     language: Language,
     holds: impl FnOnce(&Condition) -> String,
-) -> [Vec<Field>; 2] {
+) -> [Vec<WrittenKey>; 2] {
     let states = |key, of: &StateList| {
         let entries: Vec<String> = of.iter().map(|e| quoted(&format!("{}:{}", e.target, e.state), language)).collect();
         (!entries.is_empty()).then(|| (key, list(&entries, language)))
@@ -94,7 +94,7 @@ pub fn of_configuration(
         let keys = [("event", text(confirm.event.as_str(), language)), ("within", seconds(confirm.within))];
         table(keys, language)
     });
-    let mut before: Vec<Field> = Vec::new();
+    let mut before: Vec<WrittenKey> = Vec::new();
     before.extend(c.description.as_ref().map(|t| ("description", quoted(t, language))));
     before.extend(c.timeout.map(|time| ("timeout", seconds(time))));
     before.extend(c.group.map(|group| ("group", text(group.as_str(), language))));
@@ -107,7 +107,7 @@ pub fn of_configuration(
     [before, states("post_conf_state", &c.post).into_iter().collect()]
 }
 
-fn raised(key: &'static str, actions: &[(Action, Origin)], language: Language) -> Option<Field> {
+fn raised(key: &'static str, actions: &[(Action, Origin)], language: Language) -> Option<WrittenKey> {
     let one = |(action, _): &(Action, Origin)| match action {
         Action::Raise(event) => Some(*event),
         Action::Function(_) => None,
@@ -115,9 +115,9 @@ fn raised(key: &'static str, actions: &[(Action, Origin)], language: Language) -
     texts(actions.iter().filter_map(one), language).map(|list| (key, list))
 }
 
-pub fn of_transition(t: &ChartTransition, language: Language) -> Vec<Field> {
+pub fn of_transition(t: &ChartTransition, language: Language) -> Vec<WrittenKey> {
     let ends = [("src", &t.src), ("tgt", &t.tgt)];
-    let mut fields: Vec<Field> =
+    let mut fields: Vec<WrittenKey> =
         ends.into_iter().filter_map(|(key, end)| Some((key, text(&end.as_ref()?.0, language)))).collect();
     let events = t.events.iter().map(|(trigger, _)| trigger);
     let events = texts(events.filter(|trigger| !matches!(trigger, Trigger::Predicate(_))), language);
@@ -129,16 +129,16 @@ pub fn of_transition(t: &ChartTransition, language: Language) -> Vec<Field> {
 }
 
 /// The keys of a state but for what is in it.
-pub fn of_state(s: &State, language: Language) -> Vec<Field> {
-    let mut fields: Vec<Field> = s.doc.iter().map(|doc| ("doc", quoted(doc, language))).collect();
+pub fn of_state(s: &State, language: Language) -> Vec<WrittenKey> {
+    let mut fields: Vec<WrittenKey> = s.doc.iter().map(|doc| ("doc", quoted(doc, language))).collect();
     fields.extend(texts(s.config.iter().map(|(id, _)| id), language).map(|list| ("config", list)));
     fields.extend(raised("entry", &s.entry, language));
     fields.extend(raised("exit", &s.exit, language));
     fields
 }
 
-pub fn of_monitor(m: &Monitor, language: Language, when: String) -> Vec<Field> {
-    let mut fields: Vec<Field> = m.description.iter().map(|t| ("description", quoted(t, language))).collect();
+pub fn of_monitor(m: &Monitor, language: Language, when: String) -> Vec<WrittenKey> {
+    let mut fields: Vec<WrittenKey> = m.description.iter().map(|t| ("description", quoted(t, language))).collect();
     fields.push(("when", when));
     fields.extend(m.raise.map(|raise| ("event", text(raise.as_str(), language))));
     fields.extend(m.cleared.map(|cleared| ("cleared", text(cleared.as_str(), language))));
