@@ -13,10 +13,10 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 /// A deployment that was read, with all that it may use. Nothing is checked yet.
-#[derive(Debug)]
-pub struct Read {
+#[derive(Debug, Clone)]
+pub struct Read<D = Deployment> {
     /// The deployment.
-    pub deployment: Deployment,
+    pub deployment: D,
     /// The component types of its libraries, and those it declares beside them.
     pub catalogue: Catalogue,
     /// The libraries it names.
@@ -25,26 +25,13 @@ pub struct Read {
     pub platform: PlatformMaker,
     /// Its texts.
     pub sources: SourceMap,
-    /// What reading found; no errors among them, or (of `read_but_for`) only such as are about single configurations.
+    /// What reading found; no errors among them, or (of `read_but_for`) only such as are about single configurations. Of one that
+    /// was checked also what that found.
     pub findings: Findings,
 }
 
 /// A deployment in which nothing was found that refuses it.
-#[derive(Debug, Clone)]
-pub struct Checked {
-    /// The deployment.
-    pub deployment: check::Accepted<Deployment>,
-    /// The component types it may use.
-    pub catalogue: Catalogue,
-    /// The libraries it names.
-    pub libraries: Libraries,
-    /// The platform it names.
-    pub platform: PlatformMaker,
-    /// Its texts.
-    pub sources: SourceMap,
-    /// Warnings and what else reading and checking found.
-    pub findings: Findings,
-}
+pub type Checked = Read<check::Accepted<Deployment>>;
 
 /// Why a deployment is refused.
 #[derive(Debug)]
@@ -150,7 +137,7 @@ pub fn check_to_replay(read: Read) -> Result<Checked, Refused> {
 
 fn checked(
     read: Read,
-    take: impl FnOnce(&mut Report) -> Option<check::Accepted<crate::model::Deployment>>,
+    take: impl FnOnce(&mut Report) -> Option<check::Accepted<Deployment>>,
 ) -> Result<Checked, Refused> {
     let Read { deployment, catalogue, libraries, platform, sources, findings: before } = read;
     let mut report = check::run(deployment, &catalogue);
@@ -158,7 +145,7 @@ fn checked(
     let mut findings = report.findings;
     findings.extend(before);
     match taken {
-        Some(deployment) => Ok(Checked { deployment, catalogue, libraries, platform, sources, findings }),
+        Some(deployment) => Ok(Read { deployment, catalogue, libraries, platform, sources, findings }),
         None => Err(Refused { findings, sources, unreadable: false }),
     }
 }

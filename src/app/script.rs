@@ -281,7 +281,7 @@ fn install(lua: &Lua, host: &SharedHost) -> mlua::Result<()> {
     });
     function!("drift", (), |h, lua, ()| {
         let drift = session(h)?.drift(RECOVERY).ok_or_else(|| error("the platform could not be read"))?;
-        values::to_lua(lua, &serde_json::to_value(drift).expect("plain data"))
+        values::to_lua(lua, &drift)
     });
     function!("recover", String, |h, _lua, how| recover(h, &how));
     function!("wait", LuaValue, |h, lua, seconds| {
@@ -304,13 +304,10 @@ fn install(lua: &Lua, host: &SharedHost) -> mlua::Result<()> {
     function!("state", String, |h, _lua, name| Ok(looks::component_state(h, &name)?.map(|s| s.to_string())));
     function!("property", String, |h, lua, name| looks::property(h, lua, &name));
     function!("port", String, |h, lua, name| looks::port(h, lua, &name));
-    function!("system", (), |h, lua, ()| values::to_lua(
-        lua,
-        &serde_json::to_value(looks::system(h)?).expect("plain data")
-    ));
+    function!("system", (), |h, lua, ()| values::to_lua(lua, &looks::system(h)?));
     function!("stack", (), |h, lua, ()| {
         let stack = session(h)?.status().stack.ok_or_else(|| error(Unanswered.to_string()))?;
-        values::to_lua(lua, &serde_json::to_value(stack).expect("plain data"))
+        values::to_lua(lua, &stack)
     });
     function!("active", (), |h, lua, ()| lua.create_sequence_from(session(h)?.hub().active()));
     function!("now", (), |h, _lua, ()| Ok(clock(h).now().as_secs_f64()));

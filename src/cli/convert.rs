@@ -1,7 +1,7 @@
 //! `davit convert`
 
 use super::exit::Exit;
-use super::input::{Parameters, is_deployment};
+use super::input::{Parameters, is_deployment, unread};
 use super::{CommandContext, CommandFailure, CommandResult, Run, write_output};
 use crate::diagnostics::Language;
 use crate::lang::{self, LoadOptions, Sources};
@@ -56,13 +56,7 @@ impl Run for Args {
         if is_deployment(&self.file) {
             let loaded = lang::load(&self.file, &self.parameters.options()?);
             let Some(deployment) = loaded.deployment else {
-                let exit = if loaded.unreadable { Exit::Usage } else { Exit::No };
-                return Err(CommandFailure {
-                    exit,
-                    findings: loaded.findings,
-                    sources: loaded.sources,
-                    ..CommandFailure::default()
-                });
+                return Err(unread(loaded.findings, loaded.sources, loaded.unreadable));
             };
             if let Some(subsystem) = deployment.subsystems.first() {
                 let message = format!("the deployment has subsystems, as `{}` of `{}`", subsystem.name, subsystem.file);
@@ -102,13 +96,7 @@ impl Run for Args {
         let options = LoadOptions { trusted: true, host: self.host, ..self.parameters.options()? };
         let converted = lang::convert(&Sources::Disk, &self.file, language, &options);
         let Some(text) = converted.text else {
-            let exit = if converted.unreadable { Exit::Usage } else { Exit::No };
-            return Err(CommandFailure {
-                exit,
-                findings: converted.findings,
-                sources: converted.sources,
-                ..CommandFailure::default()
-            });
+            return Err(unread(converted.findings, converted.sources, converted.unreadable));
         };
         context.out.findings(&converted.findings, &converted.sources);
         write_output(context, self.output.as_deref(), &text)?;

@@ -79,9 +79,9 @@ impl ClockKind {
 impl Run for Args {
     fn run(self, context: &CommandContext) -> CommandResult {
         if self.detach {
-            return detach::run(context).map_err(|failure| failure.in_json(self.json));
+            return detach::run(context);
         }
-        self.deploy(context).map_err(|failure| failure.in_json(self.json))
+        self.deploy(context)
     }
 }
 

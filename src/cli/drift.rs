@@ -29,13 +29,6 @@ pub struct Args {
 
 impl Run for Args {
     fn run(self, context: &CommandContext) -> CommandResult {
-        let json = self.json;
-        self.show(context).map_err(|failure| failure.in_json(json))
-    }
-}
-
-impl Args {
-    fn show(self, context: &CommandContext) -> CommandResult {
         let out = &context.out;
         let patience = Patience::within(self.within);
         let mut client = connect(self.name.as_deref())?;

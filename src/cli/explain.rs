@@ -95,7 +95,7 @@ fn one(out: &Output, what: &str, json: bool) -> Result<(), CommandFailure> {
     }
     let entries = schema::about(what);
     if entries.is_empty() {
-        return Err(unknown(what).in_json(json));
+        return Err(unknown(what));
     }
     if json {
         out.json(&entries);

@@ -117,8 +117,7 @@ impl Run for Args {
         } else {
             let read =
                 CommandInput { file: self.file.clone(), parameters: self.parameters.clone() }.read_but_for(context)?;
-            let refused =
-                |findings| CommandFailure { findings, sources: read.sources.clone(), ..CommandFailure::default() };
+            let refused = |findings| CommandFailure::found(findings, read.sources.clone());
             let subsystems = read.deployment.all_subsystems();
             let region = self.inside.among(subsystems.iter().map(|(path, _)| path.as_str()))?;
             let region = region.as_ref();

@@ -81,8 +81,7 @@ impl CommandInput {
 
 impl From<Refused> for CommandFailure {
     fn from(refused: Refused) -> Self {
-        let exit = if refused.unreadable { Exit::Usage } else { Exit::No };
-        Self { exit, findings: refused.findings, sources: refused.sources, ..Self::default() }
+        unread(refused.findings, refused.sources, refused.unreadable)
     }
 }
 
@@ -209,9 +208,10 @@ pub fn coordinators(
     }
 }
 
-fn unread(findings: Findings, sources: SourceMap, unreadable: bool) -> CommandFailure {
+/// What was found instead of what is read: usage where a text could not be read at all.
+pub fn unread(findings: Findings, sources: SourceMap, unreadable: bool) -> CommandFailure {
     let exit = if unreadable { Exit::Usage } else { Exit::No };
-    CommandFailure { exit, findings, sources, ..CommandFailure::default() }
+    CommandFailure { exit, findings, sources }
 }
 
 /// Whether a file is a deployment: YAML with the key `davit` at the beginning of a line.

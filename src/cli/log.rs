@@ -44,13 +44,6 @@ pub struct Args {
 
 impl Run for Args {
     fn run(self, context: &CommandContext) -> CommandResult {
-        let json = self.json;
-        self.show(context).map_err(|failure| failure.in_json(json))
-    }
-}
-
-impl Args {
-    fn show(self, context: &CommandContext) -> CommandResult {
         if self.follow {
             return self.follow(context);
         }
@@ -71,7 +64,9 @@ impl Args {
         }
         Ok(Exit::Done)
     }
+}
 
+impl Args {
     /// How many entries are asked for: all, where only some of them are shown.
     fn at_most(&self) -> Option<usize> {
         self.last.filter(|_| !self.is_sifted())
@@ -206,24 +201,15 @@ pub fn line(out: &Output, entry: &Json, steps: bool) -> String {
         "requested" => format!("request    {} by {}", text(&entry["ask"]), text(&entry["by"])),
         "answered" => {
             let style = if entry["ok"] == true { Style::Good } else { Style::Bad };
-            let mut line = format!(
+            let line = format!(
                 "answer     {} ({}, {})",
                 out.paint(style, text(&entry["answer"])),
                 count(entry["steps"].as_array().map_or(0, Vec::len), "step"),
                 duration(entry["took_us"].as_f64().unwrap_or_default()),
             );
-            for reason in entry["reasons"].as_array().into_iter().flatten() {
-                line.push_str(&format!("\n{:>12}           {}", "", text(reason)));
-            }
-            line + &if steps { below(out, entry) } else { String::new() }
+            line + &reasons(entry) + &if steps { below(out, entry) } else { String::new() }
         }
-        "lost" => {
-            let mut line = format!("lost       {}", out.paint(Style::Bad, text(&entry["event"])));
-            for reason in entry["reasons"].as_array().into_iter().flatten() {
-                line.push_str(&format!("\n{:>12}           {}", "", text(reason)));
-            }
-            line
-        }
+        "lost" => format!("lost       {}", out.paint(Style::Bad, text(&entry["event"]))) + &reasons(entry),
         "stale" => format!("stale      {}", text(&entry["event"])),
         "fault" => {
             format!("{}      {}: {}", out.paint(Style::Bad, "fault"), text(&entry["component"]), text(&entry["reason"]))
@@ -269,6 +255,12 @@ pub fn line(out: &Output, entry: &Json, steps: bool) -> String {
         other => format!("{other} {entry}"),
     };
     format!("{:>12.6}  {what}\n", entry["at"].as_f64().unwrap_or_default())
+}
+
+/// The reasons of an entry, one line each.
+fn reasons(entry: &Json) -> String {
+    let line = |reason: &Json| format!("\n{:>12}           {}", "", text(reason));
+    entry["reasons"].as_array().into_iter().flatten().map(line).collect()
 }
 
 /// The steps of an entry, one line each.

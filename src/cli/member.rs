@@ -2,7 +2,7 @@
 
 use super::exit::Exit;
 use super::output::Style;
-use super::remote::{Patience, WITHIN, WaitFor, Which, connect, failure, seconds};
+use super::remote::{Patience, WITHIN, WaitFor, Which, ask, seconds};
 use super::request::request;
 use super::status::text;
 use super::{CommandContext, CommandResult, Run};
@@ -32,9 +32,7 @@ impl Run for GetArgs {
         let out = &context.out;
         let params = json!({ "name": self.member, "within_s": self.within });
         let patience = Patience::within(self.within);
-        let client = connect(self.which.name.as_deref());
-        let seen = client.and_then(|mut client| client.call("get", &params, patience.left()).map_err(failure));
-        let seen = seen.map_err(|failure| failure.in_json(self.json))?;
+        let seen = ask(self.which.name.as_deref(), "get", &params, patience.left())?;
         let there = !seen["value"].is_null();
         if self.json {
             out.json(&seen);
@@ -87,11 +85,8 @@ pub struct SetArgs {
 impl Run for SetArgs {
     fn run(self, context: &CommandContext) -> CommandResult {
         let patience = Patience::within(self.wait.within);
-        let ask = || {
-            let mut client = connect(self.which.name.as_deref())?;
-            client.call("get", &json!({ "name": self.member, "within_s": 0 }), patience.left()).map_err(failure)
-        };
-        let seen = ask().map_err(|failure| failure.in_json(self.json))?;
+        let params = json!({ "name": self.member, "within_s": 0 });
+        let seen = ask(self.which.name.as_deref(), "get", &params, patience.left())?;
         let value = meant(&self.value, text(&seen["type"]));
         let params = json!({ "name": self.member, "value": value, "force": self.force });
         request(context, "set", params, &self.which, &self.wait, &patience, self.json)

@@ -56,7 +56,7 @@ use crate::app::Extensions;
 use crate::diagnostics::{SourceMap, to_json};
 use crate::model::codes::CLI_UNWRITABLE;
 use crate::model::{Code, Finding, Findings};
-use clap::Parser;
+use clap::{FromArgMatches, Parser};
 use exit::Exit;
 use output::{Color, Output};
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -156,20 +156,17 @@ pub struct CommandFailure {
     pub findings: Findings,
     /// The texts the findings are about.
     pub sources: SourceMap,
-    /// Whether the findings go to stdout as `{"ok":false,"findings":[…]}`.
-    pub json: bool,
-}
-
-impl Default for CommandFailure {
-    fn default() -> Self {
-        Self { exit: Exit::No, findings: Vec::new(), sources: SourceMap::new(), json: false }
-    }
 }
 
 impl CommandFailure {
+    /// Findings about these texts; the answer is no.
+    pub fn found(findings: Findings, sources: SourceMap) -> Self {
+        Self { exit: Exit::No, findings, sources }
+    }
+
     /// One error; the answer is no.
     pub fn no(code: Code, message: impl Into<String>, help: impl Into<String>) -> Self {
-        Self { findings: vec![Finding::error(code, message).help(help)], ..Self::default() }
+        Self::found(vec![Finding::error(code, message).help(help)], SourceMap::new())
     }
 
     /// One error of usage, or input that cannot be read.
@@ -184,13 +181,6 @@ impl CommandFailure {
             None => finding.message.clone(),
         };
         self.findings.iter().map(said).collect::<Vec<_>>().join("; ")
-    }
-
-    /// The same, as JSON if so asked.
-    #[must_use]
-    pub fn in_json(mut self, json: bool) -> Self {
-        self.json = json;
-        self
     }
 }
 
@@ -225,8 +215,12 @@ pub fn main(extensions: impl Into<Extensions>) -> ExitCode {
 
 fn run(extensions: Extensions) -> ExitCode {
     signals::ignore_large_files();
-    let cli = match Cli::try_parse() {
-        Ok(cli) => cli,
+    let parsed = command().try_get_matches().and_then(|matches| {
+        let asked = matches.subcommand().map(|(_, args)| args.try_get_one("json"));
+        Ok((Cli::from_arg_matches(&matches)?, matches!(asked, Some(Ok(Some(true))))))
+    });
+    let (cli, json) = match parsed {
+        Ok(parsed) => parsed,
         Err(error) => {
             // Also help and version, which are no errors.
             if let Err(unwritten) = error.print() {
@@ -240,19 +234,20 @@ fn run(extensions: Extensions) -> ExitCode {
     if matches!(cli.command, Command::Deploy(_) | Command::Run(_))
         && let Err(error) = last_words::prepare()
     {
-        return tell(context.out, deploy::short(error), false).into();
+        return tell(context.out, deploy::short(error), FailureAnswer::Text).into();
     }
-    // Their help promises one object a line.
-    let streams = match &cli.command {
-        Command::Deploy(_) | Command::Run(_) | Command::Sim(_) | Command::Monitor(_) => true,
-        Command::Watch(_) => true,
-        Command::Log(log) => log.streams(),
-        _ => false,
+    let answers = match &cli.command {
+        _ if !json => FailureAnswer::Text,
+        // Their help promises one object a line.
+        Command::Deploy(_) | Command::Run(_) | Command::Sim(_) | Command::Monitor(_) => FailureAnswer::JsonLine,
+        Command::Watch(_) => FailureAnswer::JsonLine,
+        Command::Log(log) if log.streams() => FailureAnswer::JsonLine,
+        _ => FailureAnswer::Json,
     };
     let ran = catch_unwind(AssertUnwindSafe(|| cli.command.run(&context)));
     let exit = match ran {
         Ok(Ok(exit)) => exit,
-        Ok(Err(failure)) => tell(context.out, failure, streams),
+        Ok(Err(failure)) => tell(context.out, failure, answers),
         Err(panic) => {
             last_words::end();
             resume_unwind(panic);
@@ -264,15 +259,23 @@ fn run(extensions: Extensions) -> ExitCode {
     exit.into()
 }
 
+/// How a failure is answered: as `{"ok":false,"findings":[…]}` by every command that was asked with `--json`.
+#[derive(Clone, Copy)]
+enum FailureAnswer {
+    Text,
+    Json,
+    JsonLine,
+}
+
 /// Prints why a command did not do its work; answers how it ended.
-fn tell(out: Output, failure: CommandFailure, streams: bool) -> Exit {
-    let CommandFailure { exit, findings, sources, json } = failure;
+fn tell(out: Output, failure: CommandFailure, answers: FailureAnswer) -> Exit {
+    let CommandFailure { exit, findings, sources } = failure;
     last_words::say(move || {
-        if json {
-            let answer = serde_json::json!({ "ok": false, "findings": to_json(&findings, &sources) });
-            if streams { out.json_line(&answer) } else { out.json(&answer) }
-        } else {
-            out.findings(&findings, &sources);
+        let answer = || serde_json::json!({ "ok": false, "findings": to_json(&findings, &sources) });
+        match answers {
+            FailureAnswer::Text => out.findings(&findings, &sources),
+            FailureAnswer::Json => out.json(&answer()),
+            FailureAnswer::JsonLine => out.json_line(&answer()),
         }
     });
     exit
@@ -286,7 +289,7 @@ fn written(out: Output, exit: Exit) -> Exit {
         format!("the output could not be written: {why}"),
         "make room where the output goes, or send it elsewhere",
     );
-    let unwritten = tell(out, failure, false);
+    let unwritten = tell(out, failure, FailureAnswer::Text);
     if exit == Exit::Done { unwritten } else { exit }
 }
 

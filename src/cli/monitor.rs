@@ -1,7 +1,7 @@
 //! `davit monitor`
 
 use super::exit::Exit;
-use super::input::{CommandInput, Parameters, is_deployment};
+use super::input::{CommandInput, Parameters, is_deployment, unread};
 use super::output::{self, Style, Table};
 use super::{CommandContext, CommandFailure, CommandResult, Run};
 use crate::check;
@@ -53,13 +53,6 @@ pub struct Args {
     parameters: Parameters,
 }
 
-impl Run for Args {
-    fn run(self, context: &CommandContext) -> CommandResult {
-        let json = self.json;
-        self.replay(context).map_err(|failure| failure.in_json(json))
-    }
-}
-
 /// The monitors, and where they stand.
 struct Found {
     monitors: Vec<Monitor>,
@@ -79,13 +72,7 @@ impl Args {
         } else {
             let loaded = lang::load_monitors(&Sources::Disk, &self.file, &self.parameters.options()?);
             if has_errors(&loaded.findings) {
-                let exit = if loaded.unreadable { Exit::Usage } else { Exit::No };
-                return Err(CommandFailure {
-                    exit,
-                    findings: loaded.findings,
-                    sources: loaded.sources,
-                    ..CommandFailure::default()
-                });
+                return Err(unread(loaded.findings, loaded.sources, loaded.unreadable));
             }
             (loaded.monitors, loaded.findings, loaded.sources)
         };
@@ -117,8 +104,10 @@ impl Args {
         };
         self.columns.iter().map(one).collect()
     }
+}
 
-    fn replay(self, context: &CommandContext) -> CommandResult {
+impl Run for Args {
+    fn run(self, context: &CommandContext) -> CommandResult {
         let renamed = self.renamed()?;
         let Found { monitors, mut findings, mut sources } = self.monitors(context)?;
         let name = self.samples.display().to_string();
@@ -140,17 +129,15 @@ impl Args {
             let origin = sources.exact(file, 1, problem.column, problem.length);
             Finding::error(problem.code, problem.message).at(origin).help(problem.help)
         };
-        let refused =
-            |findings: Findings, sources: SourceMap| CommandFailure { findings, sources, ..CommandFailure::default() };
         if !lines.next().map_err(|error| unreadable(&error))? || is_blank(&lines.text) {
             findings.push(wrong(&mut sources, &lines, empty(false)));
-            return Err(refused(findings, sources));
+            return Err(CommandFailure::found(findings, sources));
         }
         let columns = match Columns::new(&lines.text) {
             Ok(columns) => columns,
             Err(problem) => {
                 findings.push(wrong(&mut sources, &lines, problem));
-                return Err(refused(findings, sources));
+                return Err(CommandFailure::found(findings, sources));
             }
         };
         let known: Vec<String> = columns.names().to_vec();
@@ -182,7 +169,7 @@ impl Args {
             );
         }
         if !missing.is_empty() || findings.iter().any(|f| f.code == SAMPLES_RENAMED) {
-            return Err(refused(findings, sources));
+            return Err(CommandFailure::found(findings, sources));
         }
         let mut raised = |raised: MonitorEvent| self.event(context, &monitors, raised);
         let mut problem = None;
@@ -210,7 +197,9 @@ impl Args {
         }
         Ok(if ok { Exit::Done } else { Exit::No })
     }
+}
 
+impl Args {
     fn event(&self, context: &CommandContext, monitors: &[Monitor], raised: MonitorEvent) {
         let monitor = &monitors[raised.monitor];
         if self.json {

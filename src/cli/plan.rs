@@ -45,13 +45,6 @@ pub struct Args {
 
 impl Run for Args {
     fn run(self, context: &CommandContext) -> CommandResult {
-        let json = self.json;
-        self.show(context).map_err(|failure| failure.in_json(json))
-    }
-}
-
-impl Args {
-    fn show(self, context: &CommandContext) -> CommandResult {
         let read = self.input.read_but_for(context)?;
         let all = read.deployment.all_subsystems();
         let region = self.hierarchy.inside.among(all.iter().map(|(path, _)| path.as_str()))?;
@@ -64,11 +57,7 @@ impl Args {
         };
         let told = planned.as_ref().err().map_or(&[][..], Vec::as_slice);
         context.out.findings(&wrong_in_others(&read, told), &read.sources);
-        let planned = planned.map_err(|findings| CommandFailure {
-            findings,
-            sources: read.sources.clone(),
-            ..CommandFailure::default()
-        })?;
+        let planned = planned.map_err(|findings| CommandFailure::found(findings, read.sources.clone()))?;
         let placed = placed(&read.deployment, &planned, region);
         if self.json {
             context.out.json(&placed.iter().map(|one| one.json(region)).collect::<Vec<_>>());
@@ -83,7 +72,9 @@ impl Args {
         }
         Ok(Exit::Done)
     }
+}
 
+impl Args {
     /// What one file asks for, below its path where there are several.
     fn show_group(&self, out: &Output, group: &PlanGroup<'_, '_>, region: Option<&Region>, top: &str, several: bool) {
         let path = if group.path.is_empty() { top } else { group.path };

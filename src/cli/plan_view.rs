@@ -99,12 +99,7 @@ impl Iterator for SystemSteps<'_> {
         if after.is_empty() {
             after.clone_from(&self.before);
         }
-        let stage = match step.stage {
-            _ if !self.monotonic => "changes",
-            PlanStage::Pre => "pre",
-            PlanStage::Changes => "changes",
-            PlanStage::Post => "post",
-        };
+        let stage = if self.monotonic { step.stage } else { PlanStage::Changes }.word();
         Some(ShownStep { index, stage, after })
     }
 }

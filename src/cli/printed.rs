@@ -10,7 +10,7 @@ use crate::model::finding::count;
 use crate::time::{Clock, Time, lock};
 use std::fs::{File, OpenOptions};
 use std::io::{self, BufRead, BufReader, Read};
-use std::os::fd::{AsFd, AsRawFd, FromRawFd, OwnedFd};
+use std::os::fd::{AsFd, AsRawFd};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 
 /// Catches what is printed, until it is dropped.
@@ -24,7 +24,7 @@ impl Printed {
     /// # Errors
     /// When the operating system refuses.
     pub fn catch(mut hear: impl FnMut(String) + Send + 'static) -> io::Result<Self> {
-        let (read, write) = pipe()?;
+        let (read, write) = io::pipe()?;
         let own = [io::stdout().as_fd().try_clone_to_owned()?, io::stderr().as_fd().try_clone_to_owned()?];
         let over = Arc::new((Mutex::new(false), Condvar::new()));
         let ends = over.clone();
@@ -45,7 +45,7 @@ impl Drop for Printed {
     fn drop(&mut self) {
         super::last_words::end();
         if let Ok(nowhere) = OpenOptions::new().write(true).open("/dev/null") {
-            let _ = lead_to(&OwnedFd::from(nowhere));
+            let _ = lead_to(&nowhere);
         }
         let over = lock(&self.over.0);
         drop(
@@ -57,18 +57,8 @@ impl Drop for Printed {
     }
 }
 
-fn pipe() -> io::Result<(File, OwnedFd)> {
-    let mut ends = [0; 2];
-    // SAFETY: two descriptors are written to a place for two.
-    if unsafe { libc::pipe2(ends.as_mut_ptr(), libc::O_CLOEXEC) } != 0 {
-        return Err(io::Error::last_os_error());
-    }
-    // SAFETY: both were opened just now and belong to nobody else.
-    Ok(unsafe { (File::from_raw_fd(ends[0]), OwnedFd::from_raw_fd(ends[1])) })
-}
-
 /// Leads stdout and stderr to a stream.
-fn lead_to(stream: &OwnedFd) -> io::Result<()> {
+fn lead_to(stream: &impl AsRawFd) -> io::Result<()> {
     for own in [libc::STDOUT_FILENO, libc::STDERR_FILENO] {
         // SAFETY: both are descriptors of this process that stay open; what held on to what they were has a copy.
         if unsafe { libc::dup2(stream.as_raw_fd(), own) } < 0 {

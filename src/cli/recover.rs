@@ -38,13 +38,6 @@ pub struct Args {
 
 impl Run for Args {
     fn run(self, context: &CommandContext) -> CommandResult {
-        let json = self.json;
-        self.show(context).map_err(|failure| failure.in_json(json))
-    }
-}
-
-impl Args {
-    fn show(self, context: &CommandContext) -> CommandResult {
         if self.forward {
             return Err(CommandFailure::no(CLI_REFUSED, NO_FORWARD, WAY_OUT));
         }

@@ -1,7 +1,6 @@
 //! What the commands that talk to a running deployment share: finding it, asking it, telling why not.
 
 use super::CommandFailure;
-use super::exit::Exit;
 use super::kept;
 use crate::limits;
 use crate::model::Ident;
@@ -101,14 +100,11 @@ pub fn failure(error: ClientError) -> CommandFailure {
             let help = meant.map_or_else(|| help.to_owned(), |life| format!("{help}; {}", kept::ended(&life)));
             CommandFailure::no(CLI_NOT_RUNNING, "no deployment is running", help)
         }
-        ClientError::Several(names) => CommandFailure {
-            exit: Exit::Usage,
-            ..CommandFailure::usage(
-                CLI_SEVERAL_RUNNING,
-                format!("{} deployments are running", names.len()),
-                format!("say which: {}", names.iter().map(|n| format!("`{n}`")).collect::<Vec<_>>().join(", ")),
-            )
-        },
+        ClientError::Several(names) => CommandFailure::usage(
+            CLI_SEVERAL_RUNNING,
+            format!("{} deployments are running", names.len()),
+            format!("say which: {}", names.iter().map(|n| format!("`{n}`")).collect::<Vec<_>>().join(", ")),
+        ),
         ClientError::Unknown { name, help } => {
             let help = meant.map_or(help, |life| kept::ended(&life));
             CommandFailure::no(CLI_NOT_RUNNING, format!("no deployment named `{name}` is running"), help)
@@ -125,15 +121,12 @@ pub fn failure(error: ClientError) -> CommandFailure {
             "set XDG_RUNTIME_DIR to a directory of yours, as where the deployment was started; a deployment of another user is \
              asked by that user",
         ),
-        ClientError::Io { name, source } => CommandFailure {
-            exit: Exit::No,
-            ..CommandFailure::no(
-                CLI_NO_ANSWER,
-                format!("the deployment `{name}` does not answer: {source}"),
-                "look at its terminal; `davit status` tries again, `davit shutdown --force` takes it down without its \
-                 coordinator",
-            )
-        },
+        ClientError::Io { name, source } => CommandFailure::no(
+            CLI_NO_ANSWER,
+            format!("the deployment `{name}` does not answer: {source}"),
+            "look at its terminal; `davit status` tries again, `davit shutdown --force` takes it down without its \
+             coordinator",
+        ),
         ClientError::Refused(error) => CommandFailure::no(
             error.data.get("code").and_then(Json::as_str).and_then(page).map_or(CLI_REFUSED, |page| page.code),
             error.message.clone(),

@@ -39,8 +39,7 @@ impl Run for EventArgs {
         let params = json!({
             "event": self.event, "wait": !self.no_wait, "wait_for": self.wait_for, "within_s": self.within
         });
-        let answer = ask(self.which.name.as_deref(), "event", &params, Patience::within(self.within).left())
-            .map_err(|failure| failure.in_json(self.json))?;
+        let answer = ask(self.which.name.as_deref(), "event", &params, Patience::within(self.within).left())?;
         let (heard, taken) = (answer["heard"].as_str(), answer["taken"].as_bool());
         let good = heard == self.wait_for.as_deref();
         // Nobody leads any more: a safety event acts by itself.
@@ -185,8 +184,7 @@ pub(super) fn request(
     params["wait"] = json!(waits);
     params["within_s"] = json!(wait.within);
     let out = &context.out;
-    let asked = ask(which.name.as_deref(), method, &params, patience.left());
-    let answer = asked.map_err(|failure| failure.in_json(json))?;
+    let answer = ask(which.name.as_deref(), method, &params, patience.left())?;
     let verdict = text(&answer["answer"]);
     if json {
         out.json(&answer);

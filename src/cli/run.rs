@@ -11,6 +11,7 @@ use super::signals::{self, SignalWatch};
 use super::{CommandContext, CommandFailure, CommandResult, Run};
 use crate::app::Extensions;
 use crate::app::script::{self, Door, Interrupt, ScriptEnd, ScriptFailure, ScriptOptions, ScriptSample};
+use crate::diagnostics::SourceMap;
 use crate::model::Ident;
 use crate::model::codes::{
     DEPLOY_UNKNOWN_PLATFORM, SCRIPT_FAILED, SCRIPT_MISSED, SCRIPT_SYNTAX, SCRIPT_UNKNOWN_PARAMETER,
@@ -59,13 +60,6 @@ pub struct Args {
 
 impl Run for Args {
     fn run(self, context: &CommandContext) -> CommandResult {
-        let json = self.json;
-        self.story(context).map_err(|failure| failure.in_json(json))
-    }
-}
-
-impl Args {
-    fn story(self, context: &CommandContext) -> CommandResult {
         let platform = self.platform.as_deref().map(|name| known(name, &context.extensions)).transpose()?;
         let clock = self.clock.make(0.0);
         let progress = ProgressView::new(context.out, self.json, &clock).map_err(super::deploy::short)?;
@@ -159,7 +153,7 @@ pub fn known(name: &str, extensions: &Extensions) -> Result<Ident, CommandFailur
 fn tell(failure: ScriptFailure) -> CommandFailure {
     match failure {
         ScriptFailure::Unreadable(finding) => {
-            CommandFailure { exit: Exit::Usage, findings: vec![*finding], ..CommandFailure::default() }
+            CommandFailure { exit: Exit::Usage, ..CommandFailure::found(vec![*finding], SourceMap::new()) }
         }
         ScriptFailure::Lua { message, syntax: true } => {
             CommandFailure::usage(SCRIPT_SYNTAX, message, "mend the script where the message points")

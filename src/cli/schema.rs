@@ -4,6 +4,7 @@ use super::exit::Exit;
 use super::{CommandContext, CommandResult, Run, write_output};
 use crate::lang::grammar::{FILES, File};
 use crate::lang::schema;
+use clap::ValueEnum;
 use std::path::PathBuf;
 
 /// What editors need to complete and to underline: JSON Schema of the files in YAML, annotations (LuaCATS) for those in Lua; or the
@@ -26,7 +27,7 @@ pub struct Args {
 }
 
 /// A kind of file.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum SchemaOf {
     /// A deployment.
     Deployment,
@@ -40,21 +41,10 @@ enum SchemaOf {
     Lua,
 }
 
-impl SchemaOf {
-    fn name(self) -> &'static str {
-        match self {
-            Self::Deployment => "deployment",
-            Self::Configurations => "configurations",
-            Self::Coordinator => "coordinator",
-            Self::Monitors => "monitors",
-            Self::Lua => "lua",
-        }
-    }
-}
-
 impl Run for Args {
     fn run(self, context: &CommandContext) -> CommandResult {
-        let text = match File::named(self.of.name()) {
+        let of = self.of.to_possible_value();
+        let text = match of.and_then(|of| File::named(of.get_name())) {
             Some(file) if self.markdown => schema::markdown(file),
             Some(file) => format!("{:#}\n", schema::json_schema(file)),
             // Each page has both languages.

@@ -49,17 +49,11 @@ pub struct Args {
 
 impl Run for Args {
     fn run(self, context: &CommandContext) -> CommandResult {
-        let read = coordinator(&self.file, &self.parameters, &self.inside, self.of.as_deref(), &self.host)
-            .map_err(|f| f.in_json(self.json))?;
+        let read = coordinator(&self.file, &self.parameters, &self.inside, self.of.as_deref(), &self.host)?;
         let (chart, mut findings) = compile(&read.chart);
         findings.splice(0..0, read.findings);
         let Some(chart) = chart else {
-            return Err(CommandFailure {
-                findings,
-                sources: read.sources,
-                json: self.json,
-                ..CommandFailure::default()
-            });
+            return Err(CommandFailure::found(findings, read.sources));
         };
         context.out.findings(&findings, &read.sources);
         let input: Box<dyn Read> = match &self.events {
@@ -69,7 +63,6 @@ impl Run for Args {
                     format!("{}: {error}", path.display()),
                     "each line of the file is a set of events, `run`, or `advance SECONDS`; `-` is standard input",
                 )
-                .in_json(self.json)
             })?),
             _ => Box::new(std::io::stdin()),
         };
@@ -90,7 +83,6 @@ impl Run for Args {
                         format!("the functions cannot be run: {failure}"),
                         "the text ran when it was read: does it depend on time or chance?",
                     )
-                    .in_json(self.json)
                 })?;
                 self.lines(context, Sim::with(&chart, functions), input)
             }
@@ -123,8 +115,7 @@ impl Args {
                         CLI_EVENTS_UNREADABLE,
                         format!("the events cannot be read: {error}"),
                         "each line is a set of events, `run`, or `advance SECONDS`, as UTF-8 text",
-                    )
-                    .in_json(self.json));
+                    ));
                 }
             };
             match sim.line(&line) {

@@ -30,13 +30,7 @@ pub struct Args {
 
 impl Run for Args {
     fn run(self, context: &CommandContext) -> CommandResult {
-        let json = self.json;
-        self.show(&context.out).map_err(|failure| failure.in_json(json))
-    }
-}
-
-impl Args {
-    fn show(self, out: &Output) -> CommandResult {
+        let out = &context.out;
         let Hierarchy { inside, depth } = &self.hierarchy;
         let mut frames = match inside.is_some() || depth.is_some() {
             false => numbered(&ask(self.name.as_deref(), "stack", &json!({}), ASK)?),

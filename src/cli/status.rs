@@ -36,13 +36,7 @@ pub struct Args {
 
 impl Run for Args {
     fn run(self, context: &CommandContext) -> CommandResult {
-        let json = self.json;
-        self.show(&context.out).map_err(|failure| failure.in_json(json))
-    }
-}
-
-impl Args {
-    fn show(self, out: &Output) -> CommandResult {
+        let out = &context.out;
         let inside = |seen: SeenStatus| seen.inside(&self.hierarchy.inside);
         let show = |seen: &[SeenStatus]| show(out, seen, self.hierarchy.depth, self.json);
         match &self.names[..] {

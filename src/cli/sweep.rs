@@ -55,13 +55,6 @@ pub struct Args {
 
 impl Run for Args {
     fn run(self, context: &CommandContext) -> CommandResult {
-        let json = self.json;
-        self.sweep(context).map_err(|failure| failure.in_json(json))
-    }
-}
-
-impl Args {
-    fn sweep(self, context: &CommandContext) -> CommandResult {
         let axes = axes(&self.set)?;
         if let Some(platform) = &self.platform {
             known(platform, &context.extensions)?;
@@ -104,7 +97,9 @@ impl Args {
         }
         Ok(if runs.iter().all(|run| run.end == PointEnd::Ok) { Exit::Done } else { Exit::No })
     }
+}
 
+impl Args {
     /// What is run of each point, but for its parameters.
     fn command(&self) -> Vec<String> {
         let mut command: Vec<String> =

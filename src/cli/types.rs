@@ -34,13 +34,6 @@ pub struct Args {
 
 impl Run for Args {
     fn run(self, context: &CommandContext) -> CommandResult {
-        let json = self.json;
-        self.show(context).map_err(|failure| failure.in_json(json))
-    }
-}
-
-impl Args {
-    fn show(self, context: &CommandContext) -> CommandResult {
         let is_file =
             self.what.as_ref().is_some_and(|w| w.contains('/') || w.ends_with(".yaml") || w.ends_with(".yml"));
         let (catalogue, wanted) = if is_file {

@@ -60,13 +60,6 @@ fn pause(text: &str) -> Result<f64, String> {
 
 impl Run for Args {
     fn run(self, context: &CommandContext) -> CommandResult {
-        let json = self.json;
-        self.show(context).map_err(|failure| failure.in_json(json))
-    }
-}
-
-impl Args {
-    fn show(self, context: &CommandContext) -> CommandResult {
         let out = &context.out;
         let client = connect(self.name.as_deref())?;
         let name = client.name().to_owned();
@@ -116,7 +109,9 @@ impl Args {
             }
         }
     }
+}
 
+impl Args {
     /// It does not run any more.
     fn over(&self, out: &Output, name: &str) -> Exit {
         if kept::told_died(out, name, self.json) {

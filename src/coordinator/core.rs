@@ -26,6 +26,7 @@ impl From<Raised> for Tag {
 }
 
 /// Who hears of what a coordinator does. It is called from the coordinator's thread and must not wait.
+#[allow(unused_variables)] // their names tell what a default that does nothing is given
 pub trait Listener {
     /// One step raised these names, in this order. What a step raises belongs together: an undo and a push of one batch
     /// are one transaction (semantics: *The stack*).
@@ -33,55 +34,37 @@ pub trait Listener {
 
     /// A transition was taken (or the chart was entered). `active` are the states active now, from the root inwards. Called
     /// before [`raised`](Self::raised) of the same step.
-    fn moved(&mut self, chart: &Chart, active: &[NodeId]) {
-        let _ = (chart, active);
-    }
+    fn moved(&mut self, chart: &Chart, active: &[NodeId]) {}
 
     /// An event is delivered; what it leads to is told next.
-    fn delivers(&mut self, event: EventName) {
-        let _ = event;
-    }
+    fn delivers(&mut self, event: EventName) {}
 
     /// The event with this ticket was taken up, and what became of it.
-    fn taken_up(&mut self, ticket: u64, delivered: Delivered) {
-        let _ = (ticket, delivered);
-    }
+    fn taken_up(&mut self, ticket: u64, delivered: Delivered) {}
 
     /// An event triggered nothing.
-    fn unmatched(&mut self, event: EventName) {
-        let _ = event;
-    }
+    fn unmatched(&mut self, event: EventName) {}
 
     /// An answer came for a visit that is over; it was not delivered.
-    fn stale(&mut self, chart: &Chart, event: EventName, tag: Tag) {
-        let _ = (chart, event, tag);
-    }
+    fn stale(&mut self, chart: &Chart, event: EventName, tag: Tag) {}
 
     /// It has reacted to everything delivered so far and is about to wait. Whoever was told of an event before, and looked
     /// while it was being reacted to, must look again now.
     fn rested(&mut self) {}
 
     /// A function of the model printed something, or failed.
-    fn said(&mut self, said: &FunctionOutput) {
-        let _ = said;
-    }
+    fn said(&mut self, said: &FunctionOutput) {}
 
     /// The model has added to its own chart: from now on this is it, and the numbers of what there was stay. Called with
     /// the same one again after each further step.
-    fn grown(&mut self, chart: &Arc<Chart>) {
-        let _ = chart;
-    }
+    fn grown(&mut self, chart: &Arc<Chart>) {}
 
     /// Its thread has ended by itself, and why: its functions could not be opened, or something in it panicked. It leads nothing
     /// any more, and nothing comes after this.
-    fn ended(&mut self, why: &str) {
-        let _ = why;
-    }
+    fn ended(&mut self, why: &str) {}
 
     /// The chart behaved badly.
-    fn trouble(&mut self, chart: &Chart, trouble: ChartTrouble) {
-        let _ = (chart, trouble);
-    }
+    fn trouble(&mut self, chart: &Chart, trouble: ChartTrouble) {}
 }
 
 /// What a chart does that it should not.

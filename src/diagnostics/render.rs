@@ -167,9 +167,7 @@ impl FindingReport {
             });
         }
     }
-}
 
-impl FindingReport {
     /// Whether a second place can be shown in one picture with the first: all between places on neighbouring lines is
     /// shown, however long these lines are.
     fn is_near(&self, span: &SourceSpan, location: &Location, sources: &SourceMap) -> bool {

@@ -1,7 +1,7 @@
 //! A coordinator: states inside states, with what they ask for; transitions with what triggers them.
 
 use super::diagram::{Diagram, DiagramEdge, DiagramNode, RankDirection, Shape, Subject, Tone};
-use super::text::short;
+use super::text::{raised, short};
 use crate::model::Statechart;
 use crate::model::statechart::{Action, ChartNode as Child, ChartTransition, INITIAL, ROOT, State, Trigger};
 use std::collections::BTreeMap;
@@ -143,17 +143,7 @@ impl Drawing<'_> {
 }
 
 fn actions(what: &str, actions: &[(Action, crate::model::Origin)]) -> Option<String> {
-    if actions.is_empty() {
-        return None;
-    }
-    let names: Vec<String> = actions
-        .iter()
-        .map(|(action, _)| match action {
-            Action::Raise(event) => event.to_string(),
-            Action::Function(_) => "function".to_owned(),
-        })
-        .collect();
-    Some(format!("{what} / {}", names.join(", ")))
+    (!actions.is_empty()).then(|| format!("{what} / {}", raised(actions).join(", ")))
 }
 
 fn state_lines(state: &State) -> Vec<String> {

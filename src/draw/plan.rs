@@ -3,7 +3,7 @@
 use super::diagram::{Diagram, DiagramEdge, DiagramNode, RankDirection, Shape, Subject, Tone};
 use super::text::short;
 use crate::model::Step;
-use crate::plan::{PlanStage, PlannedStep};
+use crate::plan::PlannedStep;
 use crate::system::Reversibility;
 use std::collections::BTreeMap;
 
@@ -57,7 +57,7 @@ fn lanes(diagram: &mut Diagram, group: usize, steps: &[PlannedStep], said: &dyn 
     for step in steps {
         // A lane for each barrier; lanes are named after the stage they belong to.
         let lane = *lanes.entry(step.wave).or_insert_with(|| {
-            let mut lane = DiagramNode::new(format!("lane{}", diagram.nodes.len()), stage(step.stage));
+            let mut lane = DiagramNode::new(format!("lane{}", diagram.nodes.len()), step.stage.word());
             lane.shape = Shape::Group;
             lane.parent = Some(group);
             let lane = diagram.add(lane);
@@ -86,13 +86,5 @@ fn lanes(diagram: &mut Diagram, group: usize, steps: &[PlannedStep], said: &dyn 
                 diagram.edges.push(DiagramEdge::new(*from, *to));
             }
         }
-    }
-}
-
-fn stage(stage: PlanStage) -> &'static str {
-    match stage {
-        PlanStage::Pre => "pre",
-        PlanStage::Changes => "changes",
-        PlanStage::Post => "post",
     }
 }

@@ -1,5 +1,17 @@
 //! How wide text is, for boxes that hold it in whatever font the viewer has.
 
+use crate::model::Origin;
+use crate::model::statechart::Action;
+
+/// What actions raise, in their order; of a function nothing is known.
+pub fn raised(actions: &[(Action, Origin)]) -> Vec<String> {
+    let name = |action: &Action| match action {
+        Action::Raise(event) => event.to_string(),
+        Action::Function(_) => "function".to_owned(),
+    };
+    actions.iter().map(|(action, _)| name(action)).collect()
+}
+
 /// Width of `text` at `size` pixels, in pixels. Measured after DejaVu Sans, the widest of the usual sans-serif fonts, so
 /// that a box is never too small.
 pub fn width(text: &str, size: f64) -> f64 {

@@ -53,9 +53,3 @@ impl Lab {
         said
     }
 }
-
-impl std::fmt::Debug for Lab {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("Lab")
-    }
-}

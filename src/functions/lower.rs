@@ -160,19 +160,30 @@ impl Lowering<'_, '_> {
                 None => self.wrong("`config`", &value, place, "name a configuration: config = \"enable_copying\""),
             }
         }
-        match table.raw_get::<Value>("doo")? {
-            Value::Nil => {}
-            Value::Function(f) => {
-                let place = (self.places)(spot, number, "doo");
-                state.doo = Some((self.function(f), place));
-            }
-            other => {
-                let place = (self.places)(spot, number, "doo");
-                self.wrong("`doo`", &other, place, "write a function: doo = function(fsm, state) … end");
-            }
-        }
+        state.doo = self.one_function(table, "doo", "fsm, state", number, spot)?;
         state.doc = table.raw_get::<Value>("doc")?.as_string().map(mlua::LuaString::to_string_lossy);
         Ok(state)
+    }
+
+    fn one_function(
+        &mut self,
+        table: &Table,
+        key: &str,
+        arguments: &str,
+        number: usize,
+        spot: Option<usize>,
+    ) -> Result<Option<(FunctionId, Origin)>> {
+        let value = table.raw_get::<Value>(key)?;
+        if value.is_nil() {
+            return Ok(None);
+        }
+        let place = (self.places)(spot, number, key);
+        if let Value::Function(f) = value {
+            return Ok(Some((self.function(f), place)));
+        }
+        let help = format!("write a function: {key} = function({arguments}) … end");
+        self.wrong(&format!("`{key}`"), &value, place, &help);
+        Ok(None)
     }
 
     fn wrong(&mut self, what: &str, value: &Value, origin: Origin, help: &str) {
@@ -252,17 +263,7 @@ impl Lowering<'_, '_> {
             let trigger = self.trigger(value, place)?;
             out.events.extend(trigger.map(|trigger| (trigger, place)));
         }
-        match table.raw_get::<Value>("guard")? {
-            Value::Nil => {}
-            Value::Function(f) => {
-                let place = (self.places)(spot, number, "guard");
-                out.guard = Some((self.function(f), place));
-            }
-            other => {
-                let place = (self.places)(spot, number, "guard");
-                self.wrong("`guard`", &other, place, "write a function: guard = function(tr, events) … end");
-            }
-        }
+        out.guard = self.one_function(table, "guard", "tr, events", number, spot)?;
         out.effect = self.actions(table, "effect", number, spot)?;
         out.pn = match table.raw_get::<Value>("pn")? {
             Value::Nil => 0.0,

@@ -43,4 +43,4 @@ pub use guards::{Guards, install as guard, loops};
 pub use lab::Lab;
 pub use lower::{Problem, Spot};
 pub use open::{Functions, HostFunction, NotOpened, Opener, Reads, read};
-pub use values::{of_value, to_value};
+pub use values::{of_value, to_lua, to_value};

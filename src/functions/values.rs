@@ -7,7 +7,10 @@ use serde_json::Value as Json;
 /// Levels of nesting that are followed.
 const LEVELS: usize = 64;
 
-/// A parameter as a Lua value.
+/// Plain data as a Lua value; null is nil.
+///
+/// # Errors
+/// When Lua has no memory for it.
 pub fn to_lua(lua: &Lua, json: &Json) -> Result<Value> {
     Ok(match json {
         Json::Null => Value::Nil,

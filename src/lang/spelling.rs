@@ -104,9 +104,7 @@ impl ExampleValue {
             Self::Call(word, entries) => format!("{{ {word}: [{}] }}", inside(entries)),
         }
     }
-}
 
-impl ExampleValue {
     /// The word of a change, and its parts by name: in Lua they are its arguments.
     fn change(&self) -> Option<(&'static str, String)> {
         let Self::Call(word, entries) = self else { return None };

@@ -301,7 +301,7 @@ impl Fields {
 }
 
 /// A file that is being read: its id and the place of the whole.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub struct Reading {
     /// The file.
     pub file: FileId,

@@ -148,10 +148,7 @@ impl DeploymentReader<'_> {
         }
         monitor::unique(cx, &mut monitors);
         params.finish(cx);
-        if charts.len() < draft.coordinators.len() {
-            return None;
-        }
-        if charts.is_empty() {
+        if charts.len() < draft.coordinators.len() || charts.is_empty() {
             return None;
         }
         let (coordinators, deploy, shutdown) = beside::join(cx, draft.name?, charts, &draft.deploy?, &draft.shutdown?);
@@ -234,10 +231,7 @@ impl DeploymentReader<'_> {
                 }
             };
             let Some(own) = known else { continue };
-            let mut activities = BTreeMap::new();
-            for (inner, outer, _) in draft.activities {
-                activities.insert(inner, outer);
-            }
+            let activities = draft.activities.into_iter().map(|(inner, outer, _)| (inner, outer)).collect();
             read.push(Subsystem {
                 name: draft.name,
                 own,

@@ -5,7 +5,7 @@ use super::monitor::Condition;
 use super::names::{ComponentName, ConfigId, EventName, Ident, MemberRef, TypeName};
 use super::state_list::StateList;
 use super::value::Value;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use smallvec::SmallVec;
 use std::collections::BTreeMap;
 use std::fmt;
@@ -251,7 +251,7 @@ impl fmt::Display for ChangeKind {
 }
 
 /// How a connection carries samples.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Default)]
 #[serde(rename_all = "lowercase")]
 pub enum Policy {
     /// The latest value.

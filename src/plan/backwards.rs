@@ -63,23 +63,11 @@ impl Backwards {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::{Origin, Step};
-    use crate::plan::PlanStage;
-    use crate::system::{Reversibility, Undo};
+    use crate::model::Step;
 
     fn step(id: StepId, wave: u32, after: &[StepId]) -> PlannedStep {
-        PlannedStep {
-            id,
-            stage: PlanStage::Changes,
-            wave,
-            after: SmallVec::from_slice(after),
-            step: Step::Destroy { component: "a".parse().unwrap() },
-            undo: Undo::Nothing,
-            reversibility: Reversibility::Exact,
-            moves: false,
-            undo_moves: false,
-            origin: Origin::NONE,
-        }
+        let step = Step::Destroy { component: "a".parse().unwrap() };
+        PlannedStep::bare(step, id, wave, SmallVec::from_slice(after))
     }
 
     #[test]

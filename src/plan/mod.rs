@@ -50,6 +50,17 @@ pub enum PlanStage {
     Post,
 }
 
+impl PlanStage {
+    /// As it is shown.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Pre => "pre",
+            Self::Changes => "changes",
+            Self::Post => "post",
+        }
+    }
+}
+
 /// The number of a step inside its plan or transaction: its place in the list.
 pub type StepId = u32;
 
@@ -76,6 +87,24 @@ pub struct PlannedStep {
     pub undo_moves: bool,
     /// The element of the configuration it comes from.
     pub origin: Origin,
+}
+
+impl PlannedStep {
+    /// A step that is done for itself: nothing undoes it.
+    pub fn bare(step: Step, id: StepId, wave: u32, after: SmallVec<[StepId; 4]>) -> Self {
+        Self {
+            id,
+            stage: PlanStage::Changes,
+            wave,
+            after,
+            step,
+            reversibility: Reversibility::Exact,
+            undo: Undo::Nothing,
+            moves: false,
+            undo_moves: false,
+            origin: Origin::NONE,
+        }
+    }
 }
 
 /// What a slot held before an absolute write.

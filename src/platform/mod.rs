@@ -64,6 +64,7 @@ pub enum ObserveError {
 }
 
 /// Where components live.
+#[allow(unused_variables)] // their names tell what a default that does nothing is given
 pub trait Platform: Send + Sync {
     /// The component types it can make (libraries' and declared ones).
     fn catalogue(&self) -> &Catalogue;
@@ -75,7 +76,6 @@ pub trait Platform: Send + Sync {
     /// beside them: it hardly takes time, or the way there and back takes most of it. Never asked of operations, which may
     /// take long and may be given up: each has a call of its own.
     fn batches(&self, step: &Step) -> bool {
-        let _ = step;
         false
     }
 
@@ -157,7 +157,6 @@ pub trait Platform: Send + Sync {
     /// Resolves a fixed list of steps (no create, destroy) to handles, so that running them again and again costs as
     /// little as the platform can make it. None: not supported, or some step is blocking.
     fn prepare(&self, steps: &[Step]) -> Option<Box<dyn Prepared>> {
-        let _ = steps;
         None
     }
 
@@ -171,7 +170,6 @@ pub trait Platform: Send + Sync {
     /// In words: there is no such component, it does not know this, or it does not come to it. By itself a platform injects
     /// nothing.
     fn inject(&self, component: ComponentName, injection: &Injection, deadline: Time) -> Result<(), String> {
-        let _ = (component, injection, deadline);
         Err("nothing can be injected into components on this platform".to_owned())
     }
 
@@ -179,7 +177,6 @@ pub trait Platform: Send + Sync {
     /// before. Whenever something is written there, `wake` is notified; whoever looks also does so after each step, and
     /// when a component was reported. Never waits. None: this platform shows no values at all.
     fn watch(&self, inputs: &[MonitorInput], wake: &Signal) -> Option<Box<dyn Watch>> {
-        let _ = (inputs, wake);
         None
     }
 

@@ -33,22 +33,42 @@ pub trait PortValue: Clone + Send + 'static {
     }
 }
 
-impl PortValue for bool {
-    fn value_type() -> ValueType {
-        ValueType::Bool
-    }
-    fn to_value(&self) -> Value {
-        Value::Bool(*self)
-    }
-    fn from_value(value: &Value) -> Option<Self> {
-        match value {
-            Value::Bool(v) => Some(*v),
-            _ => None,
+fn text(value: &Value) -> Option<&Arc<str>> {
+    if let Value::Str(text) = value { Some(text) } else { None }
+}
+
+/// Types that are one value of the model: which, the way there and back, and the number that it is.
+macro_rules! scalars {
+    ($($(#[$attribute:meta])* $ty:ty: $model:ident, $to:expr, $from:expr, $number:expr;)*) => {$(
+        impl PortValue for $ty {
+            fn value_type() -> ValueType {
+                ValueType::$model
+            }
+            fn to_value(&self) -> Value {
+                let to: fn(&Self) -> Value = $to;
+                to(self)
+            }
+            $(#[$attribute])*
+            fn from_value(value: &Value) -> Option<Self> {
+                let from: fn(&Value) -> Option<Self> = $from;
+                from(value)
+            }
+            fn number(&self, path: &[ValuePart]) -> Option<f64> {
+                let number: fn(&Self) -> Option<f64> = $number;
+                if path.is_empty() { number(self) } else { None }
+            }
         }
-    }
-    fn number(&self, path: &[ValuePart]) -> Option<f64> {
-        path.is_empty().then(|| f64::from(u8::from(*self)))
-    }
+    )*};
+}
+
+scalars! {
+    bool: Bool, |v| Value::Bool(*v), |value| if let Value::Bool(v) = value { Some(*v) } else { None }, |v| Some(f64::from(u8::from(*v)));
+    f64: Float, |v| Value::Float(*v), Value::as_f64, |v| Some(*v);
+    #[allow(clippy::cast_possible_truncation)]
+    f32: Float, |v| Value::Float(f64::from(*v)), |value| value.as_f64().map(|v| v as Self), |v| Some(f64::from(*v));
+    String: Str, |v| Value::str(v), |value| text(value).map(ToString::to_string), |_| None;
+    Arc<str>: Str, |v| Value::Str(v.clone()), |value| text(value).cloned(), |_| None;
+    EventName: Event, |v| Value::str(v.as_str()), |value| Self::new(text(value)?).ok(), |_| None;
 }
 
 macro_rules! integers {
@@ -82,91 +102,6 @@ macro_rules! integers {
     )*};
 }
 integers!(i8, i16, i32, i64, u8, u16, u32, u64, usize);
-
-impl PortValue for f64 {
-    fn value_type() -> ValueType {
-        ValueType::Float
-    }
-    fn to_value(&self) -> Value {
-        Value::Float(*self)
-    }
-    fn from_value(value: &Value) -> Option<Self> {
-        value.as_f64()
-    }
-    fn number(&self, path: &[ValuePart]) -> Option<f64> {
-        path.is_empty().then_some(*self)
-    }
-}
-
-impl PortValue for f32 {
-    fn value_type() -> ValueType {
-        ValueType::Float
-    }
-    fn to_value(&self) -> Value {
-        Value::Float(f64::from(*self))
-    }
-    #[allow(clippy::cast_possible_truncation)]
-    fn from_value(value: &Value) -> Option<Self> {
-        value.as_f64().map(|v| v as Self)
-    }
-    fn number(&self, path: &[ValuePart]) -> Option<f64> {
-        path.is_empty().then(|| f64::from(*self))
-    }
-}
-
-impl PortValue for String {
-    fn value_type() -> ValueType {
-        ValueType::Str
-    }
-    fn to_value(&self) -> Value {
-        Value::str(self)
-    }
-    fn from_value(value: &Value) -> Option<Self> {
-        match value {
-            Value::Str(v) => Some(v.to_string()),
-            _ => None,
-        }
-    }
-    fn number(&self, _: &[ValuePart]) -> Option<f64> {
-        None
-    }
-}
-
-impl PortValue for Arc<str> {
-    fn value_type() -> ValueType {
-        ValueType::Str
-    }
-    fn to_value(&self) -> Value {
-        Value::Str(self.clone())
-    }
-    fn from_value(value: &Value) -> Option<Self> {
-        match value {
-            Value::Str(v) => Some(v.clone()),
-            _ => None,
-        }
-    }
-    fn number(&self, _: &[ValuePart]) -> Option<f64> {
-        None
-    }
-}
-
-impl PortValue for EventName {
-    fn value_type() -> ValueType {
-        ValueType::Event
-    }
-    fn to_value(&self) -> Value {
-        Value::str(self.as_str())
-    }
-    fn from_value(value: &Value) -> Option<Self> {
-        match value {
-            Value::Str(v) => Self::new(v).ok(),
-            _ => None,
-        }
-    }
-    fn number(&self, _: &[ValuePart]) -> Option<f64> {
-        None
-    }
-}
 
 impl<T: PortValue, const N: usize> PortValue for [T; N] {
     fn value_type() -> ValueType {

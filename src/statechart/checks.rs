@@ -75,21 +75,16 @@ fn walk_connectors(chart: &Chart, null: bool, findings: &mut Findings) {
         }
     }
     if let Some(node) = too_long.filter(|_| !null) {
-        let node = NodeId(node);
-        findings.push(
-            Finding::error(
-                codes::CHART_LONG_CHAIN,
-                format!(
-                    "more than {} connectors follow one another from `{}`",
-                    limits::CONNECTOR_CHAIN,
-                    chart.fqn(node)
-                ),
-            )
-            .at(chart.origin(node))
-            .path(chart.fqn(node).to_string())
-            .help("put states between them"),
-        );
+        let (most, fqn) = (limits::CONNECTOR_CHAIN, chart.fqn(NodeId(node)));
+        let message = format!("more than {most} connectors follow one another from `{fqn}`");
+        let finding = Finding::error(codes::CHART_LONG_CHAIN, message);
+        findings.push(of_node(chart, NodeId(node), finding).help("put states between them"));
     }
+}
+
+/// A finding about a state or connector.
+fn of_node(chart: &Chart, node: NodeId, finding: Finding) -> Finding {
+    finding.at(chart.origin(node)).path(chart.fqn(node).to_string())
 }
 
 /// Of a cycle that needs no event: an error. Of one that does: a warning, with what opens it.
@@ -167,47 +162,26 @@ fn no_way_out(chart: &Chart, findings: &mut Findings) {
     for node in chart.nodes().skip(1).filter(|node| !own(*node)) {
         let mut around = std::iter::successors(chart.parent(node), |n| chart.parent(*n));
         if !chart.is_state(node) {
-            findings.push(
-                Finding::warning(
-                    codes::CHART_NO_OUTGOING,
-                    format!(
-                        "the connector `{}` has no outgoing transition, so no path leads through it",
-                        chart.fqn(node)
-                    ),
-                )
-                .at(chart.origin(node))
-                .path(chart.fqn(node).to_string())
-                .help("write a transition from it, or take it out"),
-            );
+            let fqn = chart.fqn(node);
+            let message = format!("the connector `{fqn}` has no outgoing transition, so no path leads through it");
+            let finding = of_node(chart, node, Finding::warning(codes::CHART_NO_OUTGOING, message));
+            findings.push(finding.help("write a transition from it, or take it out"));
         } else if around.any(own) || inside[node.index()] {
             others.push(node);
         } else if chart.parent(node).is_some_and(|parent| parent == NodeId::ROOT || inside[parent.index()]) {
             // Only the outermost of states that cannot be left.
-            findings.push(
-                Finding::warning(
-                    codes::CHART_NO_OUTGOING,
-                    format!("no outgoing transitions from `{}`: once entered it is never left", chart.fqn(node)),
-                )
-                .at(chart.origin(node))
-                .path(chart.fqn(node).to_string())
-                .help("right for a final state; else write the transition that leads on"),
-            );
+            let message = format!("no outgoing transitions from `{}`: once entered it is never left", chart.fqn(node));
+            let finding = of_node(chart, node, Finding::warning(codes::CHART_NO_OUTGOING, message));
+            findings.push(finding.help("right for a final state; else write the transition that leads on"));
         }
     }
     if let Some(first) = others.first() {
         let shown: Vec<String> = others.iter().take(8).map(|n| format!("`{}`", chart.fqn(*n))).collect();
+        let shown = shown.join(", ");
         let more = if others.len() > 8 { format!(" and {} more", others.len() - 8) } else { String::new() };
-        findings.push(
-            Finding::info(
-                codes::CHART_NO_OUTGOING,
-                format!(
-                    "no outgoing transitions of their own: {}{more}; transitions around or inside lead out",
-                    shown.join(", ")
-                ),
-            )
-            .at(chart.origin(*first))
-            .path(chart.fqn(*first).to_string()),
-        );
+        let message =
+            format!("no outgoing transitions of their own: {shown}{more}; transitions around or inside lead out");
+        findings.push(of_node(chart, *first, Finding::info(codes::CHART_NO_OUTGOING, message)));
     }
 }
 
@@ -230,12 +204,9 @@ fn unreachable(chart: &Chart, reached: &[bool], findings: &mut Findings) {
     for node in chart.nodes().filter(|n| !reached[n.index()] && chart.is_state(*n)) {
         // Only the outermost state of those that cannot be reached.
         if chart.parent(node).is_some_and(|parent| reached[parent.index()]) {
-            findings.push(
-                Finding::warning(codes::CHART_UNREACHABLE, format!("`{}` is never entered", chart.fqn(node)))
-                    .at(chart.origin(node))
-                    .path(chart.fqn(node).to_string())
-                    .help("write a transition that leads to it, or take it out"),
-            );
+            let finding = Finding::warning(codes::CHART_UNREACHABLE, format!("`{}` is never entered", chart.fqn(node)));
+            let help = "write a transition that leads to it, or take it out";
+            findings.push(of_node(chart, node, finding).help(help));
         }
     }
 }
@@ -253,20 +224,16 @@ fn ambiguous(chart: &Chart, findings: &mut Findings) {
             }
             if let Some((a, b, event)) = clash(chart, &group) {
                 let what = event.map_or("any event".to_owned(), |event| format!("`{}`", chart.event_text(event)));
+                let (fqn, to) = (chart.fqn(node), chart.fqn(chart.ends(EdgeId(a)).1));
+                let message =
+                    format!("on {what}, `{fqn}` has two transitions of equal priority; the one to `{to}` is taken");
                 findings.push(
-                    Finding::warning(
-                        codes::CHART_ORDER_DECIDES,
-                        format!(
-                            "on {what}, `{}` has two transitions of equal priority; the one to `{}` is taken",
-                            chart.fqn(node),
-                            chart.fqn(chart.ends(EdgeId(a)).1)
-                        ),
-                    )
-                    .at(chart.edge_origin(EdgeId(a)))
-                    .labelled("this one is taken")
-                    .also(chart.edge_origin(EdgeId(b)), "this one is not")
-                    .path(chart.fqn(node).to_string())
-                    .help("give the one that matters more a higher `pn`"),
+                    Finding::warning(codes::CHART_ORDER_DECIDES, message)
+                        .at(chart.edge_origin(EdgeId(a)))
+                        .labelled("this one is taken")
+                        .also(chart.edge_origin(EdgeId(b)), "this one is not")
+                        .path(fqn.to_string())
+                        .help("give the one that matters more a higher `pn`"),
                 );
             }
         }
@@ -313,20 +280,16 @@ fn shadowed(chart: &Chart, findings: &mut Findings) {
         let mut out = chart.nodes[node.index()].out.ids();
         let Some(before) = out.find(|edge| never_fails(chart, *edge, &mut always)) else { continue };
         for edge in out {
+            let to = |edge: u32| chart.fqn(chart.ends(EdgeId(edge)).1);
+            let (fqn, to, other) = (chart.fqn(node), to(edge), to(before));
+            let message =
+                format!("the transition from `{fqn}` to `{to}` is never taken: any event takes the one to `{other}`");
             findings.push(
-                Finding::warning(
-                    codes::CHART_SHADOWED,
-                    format!(
-                        "the transition from `{}` to `{}` is never taken: any event takes the one to `{}`",
-                        chart.fqn(node),
-                        chart.fqn(chart.ends(EdgeId(edge)).1),
-                        chart.fqn(chart.ends(EdgeId(before)).1)
-                    ),
-                )
-                .at(chart.edge_origin(EdgeId(edge)))
-                .also(chart.edge_origin(EdgeId(before)), "this one takes any event")
-                .path(chart.fqn(node).to_string())
-                .help("give this one a higher `pn`, or list events on the other"),
+                Finding::warning(codes::CHART_SHADOWED, message)
+                    .at(chart.edge_origin(EdgeId(edge)))
+                    .also(chart.edge_origin(EdgeId(before)), "this one takes any event")
+                    .path(fqn.to_string())
+                    .help("give this one a higher `pn`, or list events on the other"),
             );
         }
     }
@@ -368,13 +331,9 @@ fn root_exit(chart: &Chart, findings: &mut Findings) {
 
 fn not_entered(chart: &Chart, findings: &mut Findings) {
     if Machine::new(chart).microstep(chart, Time::default(), &mut Nobody) == MicrostepResult::NotEntered {
-        let initial = NodeId(chart.initial);
-        findings.push(
-            Finding::warning(codes::CHART_NOT_ENTERED, "no path leads from the initial connector without an event")
-                .at(chart.origin(initial))
-                .path(chart.fqn(initial).to_string())
-                .help("take the events off one of the transitions from `initial`"),
-        );
+        let message = "no path leads from the initial connector without an event";
+        let finding = of_node(chart, NodeId(chart.initial), Finding::warning(codes::CHART_NOT_ENTERED, message));
+        findings.push(finding.help("take the events off one of the transitions from `initial`"));
     }
 }
 
@@ -409,14 +368,8 @@ fn endless(chart: &Chart, reached: &[bool], findings: &mut Findings) {
                 break;
             }
         }
-        findings.push(
-            Finding::warning(
-                codes::CHART_ENDLESS,
-                format!("once there, the coordinator never comes to rest: {}", names.join(" → ")),
-            )
-            .at(chart.origin(NodeId(at)))
-            .path(chart.fqn(NodeId(at)).to_string())
-            .help("let one of these transitions wait for an event other than the completion"),
-        );
+        let message = format!("once there, the coordinator never comes to rest: {}", names.join(" → "));
+        let finding = of_node(chart, NodeId(at), Finding::warning(codes::CHART_ENDLESS, message));
+        findings.push(finding.help("let one of these transitions wait for an event other than the completion"));
     }
 }

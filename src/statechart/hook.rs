@@ -62,6 +62,7 @@ pub enum Doo {
 /// What a machine calls. Every method has a default that does nothing: a pure chart needs none.
 ///
 /// Functions report their own errors; an error never aborts a transition.
+#[allow(unused_variables)] // their names tell what a default that does nothing is given
 pub trait Hook {
     /// Whether the hook has its hand in single microsteps: it implements [`poll`](Self::poll), [`before_step`](Self::before_step),
     /// [`after_step`](Self::after_step) or [`go_on`](Self::go_on). If not, [`Machine::run`](super::Machine::run) leaves out
@@ -88,14 +89,11 @@ pub trait Hook {
 
     /// The seconds of a time event whose time a function says; asked on every entry of `state`. None: it never comes.
     fn seconds(&mut self, function: FunctionId, state: NodeId, view: &mut HookContext<'_>) -> Option<f64> {
-        let _ = (function, state, view);
         None
     }
 
     /// Moves what functions said since the last time to the end of `said`.
-    fn said(&mut self, said: &mut Vec<FunctionOutput>) {
-        let _ = said;
-    }
+    fn said(&mut self, said: &mut Vec<FunctionOutput>) {}
 
     /// What functions have said up to here, for who watches and wants it in order with what happens
     /// ([`HEARS`](Self::HEARS)). Drained.
@@ -119,83 +117,58 @@ pub trait Hook {
     }
 
     /// What happens, told to a model's own `dbg` printer.
-    fn trace(&mut self, what: Trace<'_>, view: &mut HookContext<'_>) {
-        let _ = (what, view);
-    }
+    fn trace(&mut self, what: Trace<'_>, view: &mut HookContext<'_>) {}
 
     /// A state is active now; its entry actions follow.
-    fn entered(&mut self, chart: &Chart, state: NodeId) {
-        let _ = (chart, state);
-    }
+    fn entered(&mut self, chart: &Chart, state: NodeId) {}
 
     /// A state is not active any more; its exit actions follow.
-    fn exited(&mut self, chart: &Chart, state: NodeId) {
-        let _ = (chart, state);
-    }
+    fn exited(&mut self, chart: &Chart, state: NodeId) {}
 
     /// A transition was chosen; its exits, effect and entries follow. A compound transition says so for each segment.
-    fn taking(&mut self, chart: &Chart, edge: EdgeId) {
-        let _ = (chart, edge);
-    }
+    fn taking(&mut self, chart: &Chart, edge: EdgeId) {}
 
     /// A name was raised.
-    fn raised(&mut self, chart: &Chart, raised: Raised) {
-        let _ = (chart, raised);
-    }
+    fn raised(&mut self, chart: &Chart, raised: Raised) {}
 
     /// At `connector` more than one way led on; `ways` lists their first segments, and the first of them is taken.
-    fn conflict(&mut self, chart: &Chart, connector: NodeId, ways: &mut dyn Iterator<Item = EdgeId>) {
-        let _ = (chart, connector, ways);
-    }
+    fn conflict(&mut self, chart: &Chart, connector: NodeId, ways: &mut dyn Iterator<Item = EdgeId>) {}
 
     /// The chart could not be entered: no path from its initial connector.
-    fn not_entered(&mut self, chart: &Chart) {
-        let _ = chart;
-    }
+    fn not_entered(&mut self, chart: &Chart) {}
 
     /// Adds the events that wait outside (rFSM's `getevents`). `false`: it failed, and the microstep ends there.
     fn poll(&mut self, queue: &mut Queue) -> bool {
-        let _ = queue;
         true
     }
 
     /// Before a step. `events` are those of the step; what the hook leaves in there the step uses. `false`: it failed, and
     /// the microstep ends there.
     fn before_step(&mut self, view: &mut HookContext<'_>, events: &mut Vec<EventId>) -> bool {
-        let _ = (view, events);
         true
     }
 
     /// After a step.
-    fn after_step(&mut self, view: &mut HookContext<'_>) {
-        let _ = view;
-    }
+    fn after_step(&mut self, view: &mut HookContext<'_>) {}
 
     /// Whether a guard lets the transition pass. What a script answers with nothing at all counts as yes.
     fn guard(&mut self, function: FunctionId, edge: EdgeId, view: &mut HookContext<'_>) -> bool {
-        let _ = (function, edge, view);
         false
     }
 
     /// Whether a predicate accepts an event.
     fn predicate(&mut self, function: FunctionId, event: EventId, view: &mut HookContext<'_>) -> bool {
-        let _ = (function, event, view);
         false
     }
 
     /// Runs an entry, exit or effect function.
-    fn action(&mut self, function: FunctionId, place: ActionPlace, view: &mut HookContext<'_>) {
-        let _ = (function, place, view);
-    }
+    fn action(&mut self, function: FunctionId, place: ActionPlace, view: &mut HookContext<'_>) {}
 
     /// The activity of `state` starts from its beginning when next resumed.
-    fn doo_reset(&mut self, state: NodeId) {
-        let _ = state;
-    }
+    fn doo_reset(&mut self, state: NodeId) {}
 
     /// Resumes the activity of `state`.
     fn doo(&mut self, function: FunctionId, state: NodeId, view: &mut HookContext<'_>) -> Doo {
-        let _ = (function, state, view);
         Doo::Failed
     }
 
@@ -205,21 +178,16 @@ pub trait Hook {
     }
 
     /// A path ends at a composite state, which only transitions that were added to a running machine do: it is none.
-    fn no_way(&mut self, chart: &Chart, from: NodeId) {
-        let _ = (chart, from);
-    }
+    fn no_way(&mut self, chart: &Chart, from: NodeId) {}
 
     /// After a microstep: the chart from now on, if the model has added to it. `chart` is the one of this microstep, whose numbers
     /// stay; events in `queue` that have got a number by it are exchanged.
     fn grown(&mut self, chart: &Chart, queue: &mut Queue) -> Option<Arc<Chart>> {
-        let _ = (chart, queue);
         None
     }
 
     /// A chain of connectors went round in a cycle, held by nothing; no transition is taken in this step.
-    fn runaway(&mut self, chart: &Chart, connector: NodeId) {
-        let _ = (chart, connector);
-    }
+    fn runaway(&mut self, chart: &Chart, connector: NodeId) {}
 }
 
 /// What a function of a model prints, or what it did wrong.

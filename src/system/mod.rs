@@ -56,10 +56,25 @@ pub trait ViewMut: View {
     fn insert_link(&mut self, from: MemberRef, to: MemberRef, policy: Policy);
     /// Removes a connection that exists.
     fn remove_link(&mut self, from: MemberRef, to: MemberRef);
+    /// A component that exists, to change it.
+    fn touch(&mut self, name: ComponentName) -> &mut ComponentNode;
+    /// Changes the components at both ends of a connection, one that is at both once.
+    fn each_end(&mut self, from: MemberRef, to: MemberRef, change: fn(&mut ComponentNode)) {
+        change(self.touch(from.component));
+        if from.component != to.component {
+            change(self.touch(to.component));
+        }
+    }
     /// Sets the run state of a component that exists.
-    fn put_state(&mut self, name: ComponentName, state: RunState);
+    fn put_state(&mut self, name: ComponentName, state: RunState) {
+        self.touch(name).state = state;
+    }
     /// Sets the property at `index` of the type's order of a component that exists.
-    fn put_property(&mut self, name: ComponentName, index: usize, value: &Value);
+    fn put_property(&mut self, name: ComponentName, index: usize, value: &Value) {
+        self.touch(name).properties[index].clone_from(value);
+    }
     /// Records a written value of the port at `index` of the type's order, or that it was never written.
-    fn put_port(&mut self, name: ComponentName, index: usize, value: Option<&Value>);
+    fn put_port(&mut self, name: ComponentName, index: usize, value: Option<&Value>) {
+        self.touch(name).put_port(index, value);
+    }
 }

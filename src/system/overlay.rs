@@ -4,7 +4,7 @@
 use super::node::{ComponentNode, Driven};
 use super::system_graph::snapshot_of;
 use super::{System, View, ViewMut};
-use crate::model::{Catalogue, ComponentName, MemberRef, Policy, RunState, Snapshot, Value};
+use crate::model::{Catalogue, ComponentName, MemberRef, Policy, Snapshot};
 use rustc_hash::FxHashMap;
 
 /// A system with changes laid over it.
@@ -60,19 +60,6 @@ impl<'a> Overlay<'a> {
             && other.nodes.keys().all(node)
             && self.link_order.iter().all(link)
             && other.link_order.iter().all(link)
-    }
-
-    fn touch(&mut self, name: ComponentName) -> &mut ComponentNode {
-        let at = match self.nodes.get(&name) {
-            Some(Some(at)) => *at,
-            _ => {
-                let node = self.base.component(name).expect("a step touches components that exist").clone();
-                self.place(node)
-            }
-        };
-        let node = &mut self.arena[at as usize];
-        node.generation += 1;
-        node
     }
 
     fn place(&mut self, node: ComponentNode) -> u32 {
@@ -146,6 +133,19 @@ impl View for Overlay<'_> {
 }
 
 impl ViewMut for Overlay<'_> {
+    fn touch(&mut self, name: ComponentName) -> &mut ComponentNode {
+        let at = match self.nodes.get(&name) {
+            Some(Some(at)) => *at,
+            _ => {
+                let node = self.base.component(name).expect("a step touches components that exist").clone();
+                self.place(node)
+            }
+        };
+        let node = &mut self.arena[at as usize];
+        node.generation += 1;
+        node
+    }
+
     fn insert_component(&mut self, node: ComponentNode) {
         self.place(node);
     }
@@ -155,10 +155,7 @@ impl ViewMut for Overlay<'_> {
     }
 
     fn insert_link(&mut self, from: MemberRef, to: MemberRef, policy: Policy) {
-        self.touch(from.component).degree += 1;
-        if from.component != to.component {
-            self.touch(to.component).degree += 1;
-        }
+        self.each_end(from, to, |node| node.degree += 1);
         let driven = self.drive(to);
         driven.links += 1;
         driven.data += u32::from(policy == Policy::Data);
@@ -167,25 +164,10 @@ impl ViewMut for Overlay<'_> {
 
     fn remove_link(&mut self, from: MemberRef, to: MemberRef) {
         let Some(policy) = self.link(from, to) else { return };
-        self.touch(from.component).degree -= 1;
-        if from.component != to.component {
-            self.touch(to.component).degree -= 1;
-        }
+        self.each_end(from, to, |node| node.degree -= 1);
         let driven = self.drive(to);
         driven.links -= 1;
         driven.data -= u32::from(policy == Policy::Data);
         self.put_link((from, to), None);
-    }
-
-    fn put_state(&mut self, name: ComponentName, state: RunState) {
-        self.touch(name).state = state;
-    }
-
-    fn put_property(&mut self, name: ComponentName, index: usize, value: &Value) {
-        self.touch(name).properties[index].clone_from(value);
-    }
-
-    fn put_port(&mut self, name: ComponentName, index: usize, value: Option<&Value>) {
-        self.touch(name).put_port(index, value);
     }
 }

@@ -148,15 +148,7 @@ impl System {
         let (Some(ty), Some(component)) = (ty, seen.components.get(&name)) else {
             let there = self.there.names.contains_key(&name);
             if there {
-                let ends: Vec<_> = self
-                    .there
-                    .links
-                    .keys()
-                    .filter(|(a, b)| a.component == name || b.component == name)
-                    .copied()
-                    .collect();
-                ends.into_iter().for_each(|(from, to)| self.remove_link(from, to));
-                self.remove_component(name);
+                self.remove_with_links(name);
             }
             return there;
         };
@@ -164,15 +156,7 @@ impl System {
         let another = present.is_none_or(|node| node.ty.name != component.ty || node.activity != component.activity);
         if another {
             if present.is_some() {
-                let ends: Vec<_> = self
-                    .there
-                    .links
-                    .keys()
-                    .filter(|(a, b)| a.component == name || b.component == name)
-                    .copied()
-                    .collect();
-                ends.into_iter().for_each(|(from, to)| self.remove_link(from, to));
-                self.remove_component(name);
+                self.remove_with_links(name);
             }
             let values = ty.properties.values().map(|declared| declared.default.clone().unwrap_or(Value::Bool(false)));
             let values = values.collect();
@@ -200,6 +184,13 @@ impl System {
             }
         }
         changed
+    }
+
+    fn remove_with_links(&mut self, name: ComponentName) {
+        let of_it = |(a, b): &&(MemberRef, MemberRef)| a.component == name || b.component == name;
+        let ends: Vec<_> = self.there.links.keys().filter(of_it).copied().collect();
+        ends.into_iter().for_each(|(from, to)| self.remove_link(from, to));
+        self.remove_component(name);
     }
 
     /// Some of its components as they are observed, with the connections that begin or end at them.
@@ -275,10 +266,6 @@ impl System {
         node.generation = self.revision;
         Some(node)
     }
-
-    fn touch(&mut self, name: ComponentName) -> &mut ComponentNode {
-        self.touch_at(self.there.names[&name]).expect("names and nodes agree")
-    }
 }
 
 impl View for System {
@@ -312,6 +299,10 @@ impl View for System {
 }
 
 impl ViewMut for System {
+    fn touch(&mut self, name: ComponentName) -> &mut ComponentNode {
+        self.touch_at(self.there.names[&name]).expect("names and nodes agree")
+    }
+
     fn insert_component(&mut self, mut node: ComponentNode) {
         self.revision += 1;
         node.born = self.revision;
@@ -329,10 +320,7 @@ impl ViewMut for System {
     }
 
     fn insert_link(&mut self, from: MemberRef, to: MemberRef, policy: Policy) {
-        self.touch(from.component).degree += 1;
-        if from.component != to.component {
-            self.touch(to.component).degree += 1;
-        }
+        self.each_end(from, to, |node| node.degree += 1);
         let (a, b) = (self.there.names[&from.component], self.there.names[&to.component]);
         let edge = self.change().graph.add_edge(a, b, Link { from: from.member, to: to.member, policy });
         self.change().links.insert((from, to), edge);
@@ -343,10 +331,7 @@ impl ViewMut for System {
 
     fn remove_link(&mut self, from: MemberRef, to: MemberRef) {
         let Some(edge) = self.change().links.remove(&(from, to)) else { return };
-        self.touch(from.component).degree -= 1;
-        if from.component != to.component {
-            self.touch(to.component).degree -= 1;
-        }
+        self.each_end(from, to, |node| node.degree -= 1);
         let data = self.change().graph.remove_edge(edge).is_some_and(|link| link.policy == Policy::Data);
         let ports = &mut self.change().driven;
         if let Some(driven) = ports.get_mut(&to) {
@@ -356,18 +341,6 @@ impl ViewMut for System {
                 ports.remove(&to);
             }
         }
-    }
-
-    fn put_state(&mut self, name: ComponentName, state: RunState) {
-        self.touch(name).state = state;
-    }
-
-    fn put_property(&mut self, name: ComponentName, index: usize, value: &Value) {
-        self.touch(name).properties[index].clone_from(value);
-    }
-
-    fn put_port(&mut self, name: ComponentName, index: usize, value: Option<&Value>) {
-        self.touch(name).put_port(index, value);
     }
 }
 

@@ -103,15 +103,4 @@ impl Signal {
     pub(super) fn clear(&self) {
         self.inner.set.store(false, Ordering::SeqCst);
     }
-
-    /// Whether the flag is set.
-    pub fn is_set(&self) -> bool {
-        self.inner.set.load(Ordering::SeqCst)
-    }
-}
-
-impl std::fmt::Debug for Signal {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "Signal({})", if self.is_set() { "set" } else { "not set" })
-    }
 }

@@ -5,37 +5,21 @@ use super::Transaction;
 use super::heed::Heed;
 use super::run::StepsRun;
 use super::touched::Touched;
-use crate::model::{Cause, OnFailure, Origin, RunState, Step};
+use crate::model::{Cause, OnFailure, RunState, Step};
 use crate::plan::backwards::Backwards;
-use crate::plan::{PlanStage, PlannedStep, StepId};
+use crate::plan::{PlannedStep, StepId};
 use crate::stack::Reason;
 use crate::system::touch::components;
-use crate::system::{Overlay, Reversibility, System, Undo, View, diff, step};
+use crate::system::{Overlay, System, Undo, View, diff, step};
 use rustc_hash::FxHashSet;
 use smallvec::SmallVec;
-
-/// A step that stands alone in its wave and before which so many others stand.
-fn item(step: Step, id: StepId, wave: u32, after: SmallVec<[StepId; 4]>) -> PlannedStep {
-    PlannedStep {
-        id,
-        stage: PlanStage::Changes,
-        wave,
-        after,
-        step,
-        reversibility: Reversibility::Exact,
-        undo: Undo::Nothing,
-        moves: false,
-        undo_moves: false,
-        origin: Origin::NONE,
-    }
-}
 
 /// Steps one after the other.
 pub(super) fn chain(steps: impl IntoIterator<Item = Step>) -> Vec<PlannedStep> {
     let mut list = Vec::new();
     for (id, step) in (0..).zip(steps) {
         let before: Option<StepId> = StepId::checked_sub(id, 1);
-        list.push(item(step, id, 0, before.into_iter().collect()));
+        list.push(PlannedStep::bare(step, id, 0, before.into_iter().collect()));
     }
     list
 }
@@ -81,7 +65,7 @@ impl WayBack {
         finishes: Option<u32>,
     ) -> StepId {
         let id = StepId::try_from(self.list.len()).expect("fewer steps than that");
-        self.list.push(item(step, id, wave, after));
+        self.list.push(PlannedStep::bare(step, id, wave, after));
         self.takes_back.push(takes_back);
         self.finishes.push(finishes);
         id

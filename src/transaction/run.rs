@@ -24,7 +24,7 @@ enum StepState {
 }
 
 /// A list of steps and how far it is.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct StepsRun {
     pub list: Arc<Vec<PlannedStep>>,
     state: Vec<StepState>,
@@ -73,20 +73,8 @@ impl StepsRun {
             state: vec![StepState::Waiting; list.len()],
             done: Vec::with_capacity(list.len()),
             list,
-            at: 0,
-            order: None,
-            batch: None,
-            failures: Vec::new(),
-            faulted: Vec::new(),
-            unsettled: Vec::new(),
-            unread: Vec::new(),
-            out: 0,
-            tries_all: false,
             limits,
-            late: Vec::new(),
-            late_from_now: false,
-            notes: false,
-            noted: Vec::new(),
+            ..Self::default()
         }
     }
 

@@ -46,7 +46,7 @@ pub(super) fn property(host: &SharedHost, lua: &Lua, text: &str) -> mlua::Result
     let system = system(host)?;
     let component = component(&system, name.component)?;
     match component.properties.get(&name.member) {
-        Some(value) => values::to_lua(lua, &serde_json::to_value(value).expect("plain data")),
+        Some(value) => values::to_lua(lua, value),
         None => {
             let known = component.properties.keys().map(Ident::as_str);
             Err(error(format!(
@@ -64,7 +64,7 @@ pub(super) fn port(host: &SharedHost, lua: &Lua, text: &str) -> mlua::Result<Lua
     let name = member(text)?;
     let system = system(host)?;
     if let Some(value) = system.ports.get(&name) {
-        return values::to_lua(lua, &serde_json::to_value(value).expect("plain data"));
+        return values::to_lua(lua, value);
     }
     let ty = component(&system, name.component)?.ty;
     let ins = host.borrow().faults.in_ports(ty);

@@ -1,34 +1,14 @@
 //! Views as Lua values, and Lua values as what is sent.
 
+use crate::functions;
 pub use crate::functions::{of_value, to_value};
 use mlua::{Error, Lua, Result, Value};
+use serde::Serialize;
 use serde_json::Value as Json;
 
 /// A view as Lua tables; null is nil.
-pub fn to_lua(lua: &Lua, json: &Json) -> Result<Value> {
-    Ok(match json {
-        Json::Null => Value::Nil,
-        Json::Bool(b) => Value::Boolean(*b),
-        Json::Number(n) => match n.as_i64() {
-            Some(i) => Value::Integer(i),
-            None => Value::Number(n.as_f64().unwrap_or(f64::NAN)),
-        },
-        Json::String(s) => Value::String(lua.create_string(s)?),
-        Json::Array(items) => {
-            let table = lua.create_table_with_capacity(items.len(), 0)?;
-            for item in items {
-                table.push(to_lua(lua, item)?)?;
-            }
-            Value::Table(table)
-        }
-        Json::Object(fields) => {
-            let table = lua.create_table_with_capacity(0, fields.len())?;
-            for (name, value) in fields {
-                table.set(name.as_str(), to_lua(lua, value)?)?;
-            }
-            Value::Table(table)
-        }
-    })
+pub fn to_lua(lua: &Lua, view: &impl Serialize) -> Result<Value> {
+    functions::to_lua(lua, &serde_json::to_value(view).expect("plain data"))
 }
 
 /// A Lua value as plain data: a table with an element 1, or with nothing, is a list.

@@ -1,8 +1,9 @@
 //! A coordinator in the JSON of rFSM's `rfsm2json`, version 2: the graph as `model2tab` gives it, and where it stands.
 
+use crate::draw::text::raised;
 use crate::model::Statechart;
 use crate::model::outline::Outline;
-use crate::model::statechart::{Action, INITIAL, Trigger};
+use crate::model::statechart::{INITIAL, Trigger};
 use serde_json::{Value, json};
 
 /// The JSON object, one line. `active` are the active states from the root to the leaf; empty: not known, or not entered.
@@ -27,14 +28,6 @@ pub fn coordinator_json(chart: &Statechart, active: &[String]) -> String {
 fn mode(outline: &Outline<'_>, leaf: &str) -> &'static str {
     let state = outline.items.iter().find(|item| item.fqn == *leaf).and_then(|item| item.state);
     if state.is_some_and(|state| state.doo.is_none()) { "done" } else { "active" }
-}
-
-fn raised(actions: &[(Action, crate::model::Origin)]) -> Vec<String> {
-    let name = |action: &Action| match action {
-        Action::Raise(event) => event.to_string(),
-        Action::Function(_) => "function".to_owned(),
-    };
-    actions.iter().map(|(action, _)| name(action)).collect()
 }
 
 fn node(outline: &Outline<'_>, at: usize) -> Value {

@@ -2,9 +2,10 @@
 //! character that is no letter, digit or underscore; composites are blocks; connectors are choices; the initial connector is
 //! `[*]`, and going to it is going to the state around it.
 
+use crate::draw::text::raised;
 use crate::model::Statechart;
 use crate::model::outline::{Outline, OutlineTransition};
-use crate::model::statechart::{Action, INITIAL, State};
+use crate::model::statechart::{INITIAL, State};
 use std::fmt::Write as _;
 
 /// The diagram. `active` are the active states (`root.sync.copying`), which are marked.
@@ -76,19 +77,11 @@ fn block(outline: &Outline<'_>, link: &OutlineTransition<'_>) -> usize {
     outline.items[link.src].parent.unwrap_or(0)
 }
 
-fn names(actions: &[(Action, crate::model::Origin)]) -> String {
-    let name = |action: &Action| match action {
-        Action::Raise(event) => event.to_string(),
-        Action::Function(_) => "function".to_owned(),
-    };
-    actions.iter().map(|(action, _)| name(action)).collect::<Vec<_>>().join(", ")
-}
-
 fn lines(state: &State) -> Vec<String> {
     let mut lines = Vec::new();
     for (word, actions) in [("entry", &state.entry), ("exit", &state.exit)] {
         if !actions.is_empty() {
-            lines.push(format!("{word} / {}", names(actions)));
+            lines.push(format!("{word} / {}", raised(actions).join(", ")));
         }
     }
     if !state.config.is_empty() {
@@ -114,7 +107,7 @@ fn label(link: &OutlineTransition<'_>) -> String {
         let _ = write!(label, " ({})", transition.pn);
     }
     if !transition.effect.is_empty() {
-        let _ = write!(label, " / {}", names(&transition.effect));
+        let _ = write!(label, " / {}", raised(&transition.effect).join(", "));
     }
     label.trim().to_owned()
 }

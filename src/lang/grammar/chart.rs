@@ -13,8 +13,6 @@ pub static COORDINATOR_FILE: Object = Object {
     doc: "A statechart that performs nothing itself. In Lua the file returns its outermost state (`return state { … }`), in YAML \
           that stands under the one key. SCXML is read too.",
     example: "coordinator: …",
-    in_yaml: "",
-    may_be_empty: false,
     keys: &[key(
         "coordinator",
         Form::Table(&STATE),
@@ -23,6 +21,7 @@ pub static COORDINATOR_FILE: Object = Object {
         ("coordinatr: {}", TEXT_UNKNOWN_KEY),
     )
     .required()],
+    ..Object::BARE
 };
 
 /// A state.
@@ -32,7 +31,6 @@ pub static STATE: Object = Object {
     doc: "A state of a coordinator, by itself or with states in it. In Lua: `state { … }`, with its states under their names and its \
           transitions as elements; rFSM's other constructors are read as well.",
     example: "idle: { entry: e_idle }",
-    in_yaml: "",
     may_be_empty: true,
     keys: &[
         key(
@@ -82,6 +80,7 @@ pub static STATE: Object = Object {
         .only(Languages::Lua),
         DOC,
     ],
+    ..Object::BARE
 };
 
 /// A connector.
@@ -90,8 +89,6 @@ pub static CONNECTOR: Object = Object {
     what: "a connector",
     doc: "A point at which transitions meet and part, and at which nothing rests. In Lua: `conn {}`.",
     example: "choice: { connector: true }",
-    in_yaml: "",
-    may_be_empty: false,
     keys: &[
         key(
             "connector",
@@ -104,6 +101,7 @@ pub static CONNECTOR: Object = Object {
         .only(Languages::Yaml),
         DOC,
     ],
+    ..Object::BARE
 };
 
 /// A transition.
@@ -112,8 +110,6 @@ pub static TRANSITION: Object = Object {
     what: "a transition",
     doc: "From one state to another, when one of its events comes. In Lua: `trans { … }`.",
     example: "{ src: idle, tgt: busy, events: [e_go] }",
-    in_yaml: "",
-    may_be_empty: false,
     keys: &[
         key(
             "src",
@@ -160,4 +156,5 @@ pub static TRANSITION: Object = Object {
         .without("0"),
         DOC,
     ],
+    ..Object::BARE
 };

@@ -11,8 +11,6 @@ pub static PARAMETER: Object = Object {
     what: "a parameter",
     doc: "A typed value that a deployment is given.",
     example: "{ type: float, default: 0.005, min: 0.0, unit: s, doc: one way }",
-    in_yaml: "",
-    may_be_empty: false,
     keys: &[
         key("type", Form::ValueType, "What it is; no event.", "type: float", ("type: event", TYPE_BAD_TYPE)).required(),
         key(
@@ -34,6 +32,7 @@ pub static PARAMETER: Object = Object {
         key("unit", Form::Text, "Its unit, for whoever reads it.", "unit: s", ("unit: 1", TEXT_WRONG_TYPE)),
         key("doc", Form::Text, "What it is for.", "doc: one way", ("doc: 1", TEXT_WRONG_TYPE)),
     ],
+    ..Object::BARE
 };
 
 const MEMBERS: Form = Form::Named(&Form::Name(NameKind::Member));
@@ -45,7 +44,6 @@ pub static EXPORTS: Object = Object {
     doc: "The members of components that a parent may touch, by the names under which it does. Each is a member of a component of this \
           file, or an export of a subsystem of it.",
     example: "exports: { ports: { level: A.x }, from: e_built }",
-    in_yaml: "",
     may_be_empty: true,
     keys: &[
         key(
@@ -78,6 +76,7 @@ pub static EXPORTS: Object = Object {
         )
         .without("from *up* on"),
     ],
+    ..Object::BARE
 };
 
 /// How a subsystem leaves.
@@ -86,8 +85,6 @@ pub static LEAVING: Object = Object {
     what: "`leaving`",
     doc: "A subsystem that wants to take away what it exports says so, and waits until its parent has let go of it.",
     example: "leaving: { says: e_leaving, until: e_released }",
-    in_yaml: "",
-    may_be_empty: false,
     keys: &[
         key(
             "says",
@@ -106,6 +103,7 @@ pub static LEAVING: Object = Object {
         )
         .required(),
     ],
+    ..Object::BARE
 };
 
 /// An instance of a deployment in another one.
@@ -114,8 +112,6 @@ pub static SUBSYSTEM: Object = Object {
     what: "a subsystem",
     doc: "A deployment as a part of another one.",
     example: "left: { deployment: robot.yaml, parameters: { delay_s: 0.02 } }",
-    in_yaml: "",
-    may_be_empty: false,
     keys: &[
         key(
             "deployment",
@@ -140,4 +136,5 @@ pub static SUBSYSTEM: Object = Object {
             ("activities: [control]", TEXT_WRONG_TYPE),
         ),
     ],
+    ..Object::BARE
 };

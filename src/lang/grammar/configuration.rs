@@ -12,8 +12,6 @@ pub static CONFIGURATIONS_FILE: Object = Object {
     what: "a file of configurations",
     doc: "Configurations by name. In Lua: `ConfiguratorConf { name = Configuration { … } }`, as in the paper's listings.",
     example: "configurations: …",
-    in_yaml: "",
-    may_be_empty: false,
     keys: &[key(
         "configurations",
         Form::Named(&Form::Table(&CONFIGURATION)),
@@ -22,6 +20,7 @@ pub static CONFIGURATIONS_FILE: Object = Object {
         ("configuratons: {}", TEXT_UNKNOWN_KEY),
     )
     .required()],
+    ..Object::BARE
 };
 
 /// A configuration.
@@ -32,7 +31,6 @@ pub static CONFIGURATION: Object = Object {
           all, and undone by an inverse that is computed. In Lua: `Configuration { … }`, with its changes as elements.",
     example: "name = Configuration { property_set(\"A.k\", 1.0) }",
     in_yaml: "name: { changes: [{ property_set: { property: A.k, value: 1.0 } }] }",
-    may_be_empty: false,
     keys: &[
         key(
             "pre_conf_state",
@@ -121,6 +119,7 @@ pub static CONFIGURATION: Object = Object {
             ("description: 1", TEXT_WRONG_TYPE),
         ),
     ],
+    ..Object::BARE
 };
 
 /// What must come after a configuration.
@@ -129,8 +128,6 @@ pub static CONFIRM: Object = Object {
     what: "`confirm`",
     doc: "The event that lets a configuration stand.",
     example: "confirm = { event = \"e_aligned\", within = 2.0 }",
-    in_yaml: "",
-    may_be_empty: false,
     keys: &[
         key(
             "event",
@@ -143,6 +140,7 @@ pub static CONFIRM: Object = Object {
         key("within", Form::Seconds, "How long it is waited for.", "within = 2.0", ("within: 0", TEXT_BAD_TIME))
             .required(),
     ],
+    ..Object::BARE
 };
 
 /// A change: one of the primitives, or what is made of them.
@@ -219,7 +217,6 @@ static CREATE: Object = Object {
     doc: "Creates a component, unconfigured. Refused where there is one of that name.",
     example: "create(\"Dynamics\", \"youbot.Dynamics\")",
     in_yaml: "create: { component: Dynamics, type: youbot.Dynamics }",
-    may_be_empty: false,
     keys: &[
         COMPONENT,
         COMPONENT_TYPE,
@@ -233,6 +230,7 @@ static CREATE: Object = Object {
         .without("the activity `default`, with a period of 10 ms"),
         PROPERTIES,
     ],
+    ..Object::BARE
 };
 
 /// Puts another component in the place of one.
@@ -246,7 +244,6 @@ static REPLACE: Object = Object {
           beside it lets that connection end.",
     example: "replace(\"ctrl\", \"Mpc\", { map = { force = \"wrench\" } })",
     in_yaml: "replace: { component: ctrl, type: Mpc, map: { force: wrench } }",
-    may_be_empty: false,
     keys: &[
         COMPONENT,
         COMPONENT_TYPE,
@@ -269,6 +266,7 @@ static REPLACE: Object = Object {
         )
         .without("each port keeps its name"),
     ],
+    ..Object::BARE
 };
 
 static DESTROY: Object = Object {
@@ -277,8 +275,8 @@ static DESTROY: Object = Object {
     doc: "Destroys a component: it is stopped and cleaned up first. Refused while it has connections.",
     example: "destroy(\"Dynamics\")",
     in_yaml: "destroy: { component: Dynamics }",
-    may_be_empty: false,
     keys: &[COMPONENT],
+    ..Object::BARE
 };
 
 static CONNECT: Object = Object {
@@ -287,7 +285,6 @@ static CONNECT: Object = Object {
     doc: "Connects an out-port to an in-port of the same type. Refused where they are connected.",
     example: "connect(\"Kin.jacobian\", \"Dynamics.jacobian\")",
     in_yaml: "connect: { from: Kin.jacobian, to: Dynamics.jacobian }",
-    may_be_empty: false,
     keys: &[
         FROM,
         TO,
@@ -300,6 +297,7 @@ static CONNECT: Object = Object {
         )
         .without("`data`"),
     ],
+    ..Object::BARE
 };
 
 /// The policy of a queue.
@@ -308,8 +306,6 @@ pub static BUFFER: Object = Object {
     what: "the policy of a connection",
     doc: "A connection that is a queue.",
     example: "{ buffer = 64 }",
-    in_yaml: "",
-    may_be_empty: false,
     keys: &[key(
         "buffer",
         Form::Whole { least: 1, most: 1_000_000 },
@@ -319,6 +315,7 @@ pub static BUFFER: Object = Object {
     )
     .unit("samples")
     .required()],
+    ..Object::BARE
 };
 
 static DISCONNECT: Object = Object {
@@ -327,8 +324,8 @@ static DISCONNECT: Object = Object {
     doc: "Removes a connection. Refused where there is none.",
     example: "disconnect(\"Kin.jacobian\", \"Dynamics.jacobian\")",
     in_yaml: "disconnect: { from: Kin.jacobian, to: Dynamics.jacobian }",
-    may_be_empty: false,
     keys: &[FROM, TO],
+    ..Object::BARE
 };
 
 static PROPERTY_SET: Object = Object {
@@ -337,7 +334,6 @@ static PROPERTY_SET: Object = Object {
     doc: "Sets a property. No step is needed where it has that value.",
     example: "property_set(\"Dynamics.force_gain\", 0.5)",
     in_yaml: "property_set: { property: Dynamics.force_gain, value: [0.1, 0.1, 0.1] }",
-    may_be_empty: false,
     keys: &[
         key(
             "property",
@@ -356,6 +352,7 @@ static PROPERTY_SET: Object = Object {
         )
         .required(),
     ],
+    ..Object::BARE
 };
 
 static PORT_WRITE: Object = Object {
@@ -364,7 +361,6 @@ static PORT_WRITE: Object = Object {
     doc: "Writes a value to an in-port that nothing drives. No step is needed where that value was written.",
     example: "port_write(\"Cart_Impedance.ext_ref_mode\", true)",
     in_yaml: "port_write: { port: Cart_Impedance.ext_ref_mode, value: true }",
-    may_be_empty: false,
     keys: &[
         key(
             "port",
@@ -383,6 +379,7 @@ static PORT_WRITE: Object = Object {
         )
         .required(),
     ],
+    ..Object::BARE
 };
 
 static OPERATION_CALL: Object = Object {
@@ -391,7 +388,6 @@ static OPERATION_CALL: Object = Object {
     doc: "Calls an operation and waits for it. Undone by `undo`, or by what the operation's type names.",
     example: "operation_call(\"youbot.setControlMode\", 6)",
     in_yaml: "operation_call: { operation: youbot.setControlMode, args: [6] }",
-    may_be_empty: false,
     keys: &[
         OPERATION,
         ARGS,
@@ -404,6 +400,7 @@ static OPERATION_CALL: Object = Object {
         )
         .without("what the operation's `effect` says"),
     ],
+    ..Object::BARE
 };
 
 /// The call that takes another one back.
@@ -413,6 +410,6 @@ pub static UNDO: Object = Object {
     doc: "The call that takes another one back.",
     example: "operation_call(\"youbot.setControlMode\", 6):undo(\"youbot.setControlMode\", 0)",
     in_yaml: "undo: { operation: youbot.setControlMode, args: [0] }",
-    may_be_empty: false,
     keys: &[OPERATION, ARGS],
+    ..Object::BARE
 };

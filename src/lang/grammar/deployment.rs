@@ -21,8 +21,6 @@ pub static DEPLOYMENT: Object = Object {
     what: "a deployment",
     doc: "Everything of one system: where its components live, what may be done to them, and who decides when. Written in YAML.",
     example: "davit: 1",
-    in_yaml: "",
-    may_be_empty: false,
     keys: &[
         key("davit", Form::Version, "The version of the format.", "davit: 1", ("davit: 2", TEXT_BAD_VALUE)).required(),
         key(
@@ -221,6 +219,7 @@ pub static DEPLOYMENT: Object = Object {
             ("faults: { step: \"start a\", how: fail }", TEXT_WRONG_TYPE),
         ),
     ],
+    ..Object::BARE
 };
 
 /// What is open to functions.
@@ -229,8 +228,6 @@ pub static TRUSTED: Object = Object {
     what: "`trusted`",
     doc: "What is open to the functions of trusted coordinators beside Lua itself.",
     example: "trusted: true",
-    in_yaml: "",
-    may_be_empty: false,
     keys: &[key(
         "open",
         Form::Several(&Form::Choice(&crate::model::Openings::NAMES)),
@@ -238,6 +235,7 @@ pub static TRUSTED: Object = Object {
         "open: [io, os]",
         ("open: [net]", TEXT_BAD_VALUE),
     )],
+    ..Object::BARE
 };
 
 /// An activity.
@@ -246,7 +244,6 @@ pub static ACTIVITY: Object = Object {
     what: "an activity",
     doc: "A thread of the embedded platform that updates components, in rounds.",
     example: "control: { period_ms: 1.0, priority: 80 }",
-    in_yaml: "",
     may_be_empty: true,
     keys: &[
         key(
@@ -274,6 +271,7 @@ pub static ACTIVITY: Object = Object {
         )
         .without("any"),
     ],
+    ..Object::BARE
 };
 
 /// The way up.
@@ -282,8 +280,6 @@ pub static DEPLOY: Object = Object {
     what: "`deploy`",
     doc: "How a deployment is brought up: the event that asks for it, and the states of the coordinators that end it.",
     example: "deploy: { event: e_start, up: operational, within_s: 20 }",
-    in_yaml: "",
-    may_be_empty: false,
     keys: &[
         key(
             "event",
@@ -317,6 +313,7 @@ pub static DEPLOY: Object = Object {
         )
         .required(),
     ],
+    ..Object::BARE
 };
 
 /// The way down.
@@ -325,8 +322,6 @@ pub static SHUTDOWN: Object = Object {
     what: "`shutdown`",
     doc: "How a deployment is taken down: the event that asks for it, and the state that ends it.",
     example: "shutdown: { event: e_shutdown, down: idle, within_s: 20 }",
-    in_yaml: "",
-    may_be_empty: false,
     keys: &[
         key(
             "event",
@@ -360,6 +355,7 @@ pub static SHUTDOWN: Object = Object {
             ("rest: [\"p ark\"]", TEXT_BAD_NAME),
         ),
     ],
+    ..Object::BARE
 };
 
 /// Bounds that the user sets.
@@ -368,8 +364,6 @@ pub static LIMITS: Object = Object {
     what: "`limits`",
     doc: "Bounds of one deployment.",
     example: "limits: { stack: 64, step_timeout_s: 1.0 }",
-    in_yaml: "",
-    may_be_empty: false,
     keys: &[
         key(
             "stack",
@@ -389,6 +383,7 @@ pub static LIMITS: Object = Object {
         )
         .without("1 s"),
     ],
+    ..Object::BARE
 };
 
 /// What simulated components do.
@@ -397,8 +392,6 @@ pub static SIMULATED: Object = Object {
     what: "`simulated`",
     doc: "What components of the simulated platform do by themselves.",
     example: "simulated: { reactions: [{ after: start radio, delay_s: 0.5, raise: e_qos_ok, component: radio }] }",
-    in_yaml: "",
-    may_be_empty: false,
     keys: &[key(
         "reactions",
         Form::List(&Form::Table(&REACTION)),
@@ -406,6 +399,7 @@ pub static SIMULATED: Object = Object {
         "reactions: [{ after: start radio, raise: e_qos_ok, component: radio }]",
         ("reactions: e_qos_ok", TEXT_WRONG_TYPE),
     )],
+    ..Object::BARE
 };
 
 /// A reaction.
@@ -414,8 +408,6 @@ pub static REACTION: Object = Object {
     what: "a reaction",
     doc: "An event that a simulated component raises after a step was done.",
     example: "{ after: start radio, delay_s: 0.5, raise: e_qos_ok, component: radio }",
-    in_yaml: "",
-    may_be_empty: false,
     keys: &[
         key(
             "after",
@@ -438,6 +430,7 @@ pub static REACTION: Object = Object {
         key("delay_s", Form::Seconds, "How much later.", "delay_s: 0.5", ("delay_s: -1", TEXT_BAD_TIME))
             .without("at once"),
     ],
+    ..Object::BARE
 };
 
 /// A fault of the simulated platform.
@@ -446,8 +439,6 @@ pub static FAULT: Object = Object {
     what: "a fault",
     doc: "A step of the simulated platform that goes wrong.",
     example: "{ step: \"property_set a.k\", how: fail, times: 1 }",
-    in_yaml: "",
-    may_be_empty: false,
     keys: &[
         key(
             "step",
@@ -477,4 +468,5 @@ pub static FAULT: Object = Object {
         key("takes_s", Form::Seconds, "How long a step takes that is `slow`: required there, and refused of any other.", "takes_s: 0.5", ("takes_s: 0", TEXT_BAD_TIME))
             .beside("how: slow"),
     ],
+    ..Object::BARE
 };

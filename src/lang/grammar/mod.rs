@@ -265,6 +265,9 @@ impl Key {
 }
 
 impl Object {
+    /// A table without anything, for what most tables leave out.
+    const BARE: Self = Self { name: "", what: "", doc: "", example: "", in_yaml: "", may_be_empty: false, keys: &[] };
+
     /// The row of a key.
     pub fn key(&self, name: &str) -> Option<&'static Key> {
         self.keys.iter().find(|key| key.name == name)

@@ -11,8 +11,6 @@ pub static MONITORS_FILE: Object = Object {
     what: "a file of monitors",
     doc: "Monitors by name. In Lua: `Monitors { name = monitor { … } }`.",
     example: "monitors: …",
-    in_yaml: "",
-    may_be_empty: false,
     keys: &[key(
         "monitors",
         Form::Named(&Form::Table(&MONITOR)),
@@ -21,6 +19,7 @@ pub static MONITORS_FILE: Object = Object {
         ("monitrs: {}", TEXT_UNKNOWN_KEY),
     )
     .required()],
+    ..Object::BARE
 };
 
 /// A monitor.
@@ -30,8 +29,6 @@ pub static MONITOR: Object = Object {
     doc: "Watches ports, run states and activities, and raises an event when a condition over time becomes true. They are run by a \
           component of the type `davit.Monitors`.",
     example: "name = monitor { when = above(\"A.x\", 2.0), event = \"e_high\" }",
-    in_yaml: "",
-    may_be_empty: false,
     keys: &[
         key(
             "when",
@@ -90,6 +87,7 @@ pub static MONITOR: Object = Object {
             ("description: 1", TEXT_WRONG_TYPE),
         ),
     ],
+    ..Object::BARE
 };
 
 /// What a comparison may have behind its two sides.
@@ -98,8 +96,6 @@ pub static COMPARISON: Object = Object {
     what: "the options of a comparison",
     doc: "What stands behind the two sides of `below`, `at_most`, `above` and `at_least`.",
     example: "above(\"A.x\", 8.0, { hysteresis = 0.5 })",
-    in_yaml: "",
-    may_be_empty: false,
     keys: &[key(
         "hysteresis",
         Form::Number,
@@ -109,4 +105,5 @@ pub static COMPARISON: Object = Object {
     )
     .unit("that of what is compared")
     .required()],
+    ..Object::BARE
 };

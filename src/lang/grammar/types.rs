@@ -25,7 +25,6 @@ pub static TYPE: Object = Object {
     what: "a component type",
     doc: "What components of a type offer, and what it means to start, stop and destroy them.",
     example: "Gain: { ports: {...}, properties: {...} }",
-    in_yaml: "",
     may_be_empty: true,
     keys: &[
         doc("doc: multiplies its input"),
@@ -96,6 +95,7 @@ pub static TYPE: Object = Object {
             ("exclusive: 1", TEXT_WRONG_TYPE),
         ),
     ],
+    ..Object::BARE
 };
 
 /// A port.
@@ -104,8 +104,6 @@ pub static PORT: Object = Object {
     what: "a port",
     doc: "A typed, directed end of data flow, `Component.port`.",
     example: "{ direction: in, type: float, unit: N }",
-    in_yaml: "",
-    may_be_empty: false,
     keys: &[
         key(
             "direction",
@@ -135,6 +133,7 @@ pub static PORT: Object = Object {
         .without("`false`: it is a note where nothing does"),
         doc("doc: the force on the tool"),
     ],
+    ..Object::BARE
 };
 
 /// A property.
@@ -143,8 +142,6 @@ pub static PROPERTY: Object = Object {
     what: "a property",
     doc: "A typed parameter of a component, set by `create` and `property_set`.",
     example: "{ type: float, default: 1.0, min: 0.0, max: 10.0, tunable: stopped }",
-    in_yaml: "",
-    may_be_empty: false,
     keys: &[
         key("type", Form::ValueType, "What it is; no event.", "type: float", ("type: event", TYPE_BAD_TYPE)).required(),
         key(
@@ -174,6 +171,7 @@ pub static PROPERTY: Object = Object {
         UNIT,
         doc("doc: gain of the loop"),
     ],
+    ..Object::BARE
 };
 
 /// An operation.
@@ -182,7 +180,6 @@ pub static OPERATION: Object = Object {
     what: "an operation",
     doc: "A call on a component that may take long; it has a deadline.",
     example: "{ args: [float], returns: bool, effect: none }",
-    in_yaml: "",
     may_be_empty: true,
     keys: &[
         key(
@@ -222,6 +219,7 @@ pub static OPERATION: Object = Object {
         .without("the answer counts"),
         doc("doc: moves the arm to its rest"),
     ],
+    ..Object::BARE
 };
 
 /// An operation that another one undoes.
@@ -230,8 +228,6 @@ pub static EFFECT: Object = Object {
     what: "`effect`",
     doc: "What undoes an operation.",
     example: "effect: { undo: park }",
-    in_yaml: "",
-    may_be_empty: false,
     keys: &[key(
         "undo",
         Form::Name(NameKind::Plain),
@@ -240,4 +236,5 @@ pub static EFFECT: Object = Object {
         ("undo: \"p ark\"", TEXT_BAD_NAME),
     )
     .required()],
+    ..Object::BARE
 };

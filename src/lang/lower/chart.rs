@@ -104,14 +104,7 @@ fn of_lua(cx: &mut Cx, origin: Origin, named: Vec<Entry>, items: Vec<Node>, root
 
 fn of_yaml(cx: &mut Cx, node: Node) -> Option<StateParts> {
     let mut fields = Fields::of(cx, node, &STATE)?;
-    let children = match fields.take(cx, "states").map(|node| (node.origin, node)) {
-        None => Vec::new(),
-        Some((_, Node { kind: Kind::Map(entries), .. })) => entries,
-        Some((_, node)) => {
-            cx.wrong(&node, "`states`", "a table of named values", fields.row("states").example);
-            Vec::new()
-        }
-    };
+    let children = fields.entries(cx, "states");
     let transitions = match fields.take(cx, "transitions") {
         None => Vec::new(),
         Some(Node { kind: Kind::List(list), .. }) => list,

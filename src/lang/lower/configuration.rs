@@ -1,6 +1,6 @@
 //! Configurations: what both spellings mean.
 
-use super::{choice, condition, name, value};
+use super::{choice, condition, entries, name, value};
 use crate::lang::concern;
 use crate::lang::grammar::{BUFFER, CHANGES, CONFIGURATION, CONFIRM, UNDO, primitive as primitive_of};
 use crate::lang::tree::{Cx, Entry, Fields, Kind, Node};
@@ -27,9 +27,7 @@ fn required(cx: &mut Cx, fields: &mut Fields, key: &'static str) -> Option<Node>
 pub fn configurations(cx: &mut Cx, node: Node) -> Vec<Configuration> {
     let example =
         cx.either(node.origin, "ConfiguratorConf { engage = Configuration { … } }", "engage: { changes: [ … ] }");
-    let Some(entries) = entries(cx, node, "the list of configurations", &example) else {
-        return Vec::new();
-    };
+    let entries = entries(cx, node, "the list of configurations", &example);
     let mut all = Vec::with_capacity(entries.len());
     for entry in entries {
         let origin = if matches!(entry.value.kind, Kind::Made(..)) { entry.value.origin } else { entry.origin };
@@ -48,17 +46,6 @@ pub fn configurations(cx: &mut Cx, node: Node) -> Vec<Configuration> {
 
 fn unnamed() -> ConfigId {
     ConfigId::new("unnamed").expect("a name")
-}
-
-fn entries(cx: &mut Cx, node: Node, what: &str, example: &str) -> Option<Vec<Entry>> {
-    match node.kind {
-        Kind::Map(entries) => Some(entries),
-        Kind::List(list) if list.is_empty() && cx.is_lua(node.origin) => Some(Vec::new()),
-        _ => {
-            cx.wrong(&node, what, "a table of named values", example);
-            None
-        }
-    }
 }
 
 /// One configuration.
@@ -402,7 +389,7 @@ fn policy(cx: &mut Cx, node: Node) -> Option<Policy> {
 fn ports(cx: &mut Cx, node: Node) -> BTreeMap<Ident, Ident> {
     const EXAMPLE: &str = "map = { force = \"wrench\" }";
     let mut out = BTreeMap::new();
-    for entry in entries(cx, node, "`map`", EXAMPLE).unwrap_or_default() {
+    for entry in entries(cx, node, "`map`", EXAMPLE) {
         let key = Node::new(Kind::Str(entry.key.into()), entry.origin);
         let from = name::<Ident>(cx, &key, "a port", EXAMPLE);
         let to = name::<Ident>(cx, &entry.value, "a port", EXAMPLE);
@@ -412,9 +399,7 @@ fn ports(cx: &mut Cx, node: Node) -> BTreeMap<Ident, Ident> {
 }
 
 fn properties_of(cx: &mut Cx, node: Node, component: Option<ComponentName>) -> BTreeMap<Ident, Value> {
-    let Some(entries) = entries(cx, node, "`properties`", "properties = { friction_comp = 0.9 }") else {
-        return BTreeMap::new();
-    };
+    let entries = entries(cx, node, "`properties`", "properties = { friction_comp = 0.9 }");
     let mut out = BTreeMap::new();
     for entry in entries {
         let key = Node::new(Kind::Str(entry.key.into()), entry.origin);

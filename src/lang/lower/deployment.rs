@@ -2,7 +2,7 @@
 
 use super::beside::{self, Fall, Rise};
 use super::interface::{self, SubsystemDraft};
-use super::{name, names, once, simulated, text, types, value};
+use super::{entries, name, names, once, simulated, text, types, value};
 use crate::lang::grammar::{ACTIVITY, DEPLOYMENT, LIMITS, TRUSTED};
 use crate::lang::tree::{Cx, Entry, Fields, Kind, Node};
 use crate::model::finding::did_you_mean;
@@ -137,14 +137,7 @@ pub fn draft(cx: &mut Cx, node: Node, file_name: &str) -> Option<Draft> {
         cx.report(finding.at(origin).help("write `trusted: true` beside it, or leave it out"));
     }
     let host = files(cx, &mut fields, "host");
-    let with = match fields.take(cx, "with") {
-        None => Vec::new(),
-        Some(Node { kind: Kind::Map(entries), .. }) => entries,
-        Some(node) => {
-            cx.wrong(&node, "`with`", "a table of named values", fields.row("with").example);
-            Vec::new()
-        }
-    };
+    let with = fields.entries(cx, "with");
     let emits = emits(cx, &mut fields);
     let safety = names(cx, &mut fields, "safety", "`safety`");
     let operator = operator(cx, &mut fields);
@@ -285,15 +278,8 @@ fn operator(cx: &mut Cx, fields: &mut Fields) -> Vec<(OperatorMay, Origin)> {
 }
 
 fn activities(cx: &mut Cx, node: Node) -> BTreeMap<Ident, Activity> {
-    let entries = match node.kind {
-        Kind::Map(entries) => entries,
-        _ => {
-            cx.wrong(&node, "`activities`", "a table of named values", ACTIVITY.example);
-            return BTreeMap::new();
-        }
-    };
     let mut out = BTreeMap::new();
-    for entry in entries {
+    for entry in entries(cx, node, "`activities`", ACTIVITY.example) {
         let key = Node::new(Kind::Str(entry.key.into()), entry.origin);
         let ident = name::<Ident>(cx, &key, "an activity", ACTIVITY.example);
         let Some(mut fields) = Fields::of(cx, entry.value, &ACTIVITY) else { continue };

@@ -1,8 +1,8 @@
 //! Fields of a table as values: what each is, its bounds, its words and its example stand in its row.
 
-use super::{Unit, choice, name, number, one_or_more, text, time, truth, whole};
+use super::{Unit, choice, entries, name, number, one_or_more, text, time, truth, whole};
 use crate::lang::grammar::Form;
-use crate::lang::tree::{Cx, Fields, Node};
+use crate::lang::tree::{Cx, Entry, Fields, Node};
 use crate::model::names::NameError;
 use std::str::FromStr;
 use std::time::Duration;
@@ -95,6 +95,12 @@ impl Fields {
         let written = self.has(key);
         let value = read(self, cx, key);
         written.then_some(value)
+    }
+
+    /// The entries of a table of named values.
+    pub fn entries(&mut self, cx: &mut Cx, key: &'static str) -> Vec<Entry> {
+        let node = self.take(cx, key);
+        node.map(|node| entries(cx, node, &format!("`{key}`"), self.row(key).example)).unwrap_or_default()
     }
 
     /// One node or several.

@@ -1,7 +1,7 @@
 //! What makes a deployment a part of another one: its parameters, what it shows, its subsystems.
 
 use super::types::{fitting, value_type};
-use super::{name, text, value};
+use super::{entries, name, text, value};
 use crate::lang::grammar::{EXPORTS, LEAVING, PARAMETER, SUBSYSTEM};
 use crate::lang::tree::{Cx, Entry, Fields, Kind, Node};
 use crate::model::subsystem::ExportKind;
@@ -45,12 +45,8 @@ pub fn interface(cx: &mut Cx, fields: &mut Fields) -> Interface {
 
 /// A table of things by plain names.
 fn named(cx: &mut Cx, node: Node, what: &str, example: &str) -> Vec<(Ident, Entry)> {
-    let Kind::Map(entries) = node.kind else {
-        cx.wrong(&node, what, "a table of named values", example);
-        return Vec::new();
-    };
     let mut out = Vec::new();
-    for entry in entries {
+    for entry in entries(cx, node, what, example) {
         let key = Node::new(Kind::Str(entry.key.to_string().into()), entry.origin);
         out.extend(name::<Ident>(cx, &key, what, example).map(|name| (name, entry)));
     }
@@ -115,14 +111,7 @@ fn subsystem(cx: &mut Cx, own: Ident, entry: Entry) -> Option<SubsystemDraft> {
     let file = fields.take(cx, "deployment");
     let named_at = file.as_ref().map_or(entry.origin, |node| node.origin);
     let file = file.and_then(|node| text(cx, &node, "`deployment`", fields.row("deployment").example));
-    let parameters = match fields.take(cx, "parameters") {
-        None => Vec::new(),
-        Some(Node { kind: Kind::Map(entries), .. }) => entries,
-        Some(node) => {
-            cx.wrong(&node, "`parameters`", "a table of named values", fields.row("parameters").example);
-            Vec::new()
-        }
-    };
+    let parameters = fields.entries(cx, "parameters");
     let mut activities = Vec::new();
     let example = fields.row("activities").example;
     if let Some(node) = fields.take(cx, "activities") {

@@ -11,7 +11,7 @@ pub mod monitor;
 mod simulated;
 pub mod types;
 
-use super::tree::{Cx, Fields, Kind, Node};
+use super::tree::{Cx, Entry, Fields, Kind, Node};
 use crate::model::finding::did_you_mean;
 use crate::model::names::NameError;
 use crate::model::{Finding, Ident, Origin, Value, codes};
@@ -282,6 +282,18 @@ pub fn value(cx: &mut Cx, node: Node, what: &str) -> Option<Value> {
 }
 
 /// One or several of something: a list, or one alone.
+/// The entries of a table of named values, none where it is something else. In Lua an empty table is a list as well.
+pub fn entries(cx: &mut Cx, node: Node, what: &str, example: &str) -> Vec<Entry> {
+    match node.kind {
+        Kind::Map(entries) => entries,
+        Kind::List(list) if list.is_empty() && cx.is_lua(node.origin) => Vec::new(),
+        _ => {
+            cx.wrong(&node, what, "a table of named values", example);
+            Vec::new()
+        }
+    }
+}
+
 pub fn one_or_more(node: Node) -> Vec<Node> {
     match node.kind {
         Kind::List(list) => list,

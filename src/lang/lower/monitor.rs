@@ -1,6 +1,6 @@
 //! Monitors: what both spellings mean.
 
-use super::{condition, name};
+use super::{condition, entries, name};
 use crate::lang::grammar::MONITOR;
 use crate::lang::tree::{Cx, Entry, Fields, Kind, Node};
 use crate::model::monitor::Sampling;
@@ -9,14 +9,7 @@ use rustc_hash::FxHashMap;
 
 /// A map of named monitors, in the order given.
 pub fn monitors(cx: &mut Cx, node: Node) -> Vec<Monitor> {
-    let entries = match node.kind {
-        Kind::Map(entries) => entries,
-        Kind::List(list) if list.is_empty() && cx.is_lua(node.origin) => Vec::new(),
-        _ => {
-            cx.wrong(&node, "the list of monitors", "a table of named values", MONITOR.example);
-            return Vec::new();
-        }
-    };
+    let entries = entries(cx, node, "the list of monitors", MONITOR.example);
     entries.into_iter().filter_map(|entry| monitor(cx, entry)).collect()
 }
 

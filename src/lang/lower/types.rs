@@ -1,6 +1,6 @@
 //! Component types declared in a deployment.
 
-use super::{choice, condition, name, text, value};
+use super::{choice, condition, entries, name, text, value};
 use crate::lang::grammar::{EFFECT, OPERATION, PORT, PROPERTY, TYPE};
 use crate::lang::tree::{Cx, Entry, Fields, Kind, Node};
 use crate::model::{
@@ -12,18 +12,8 @@ use std::sync::Arc;
 
 /// The map of declared types.
 pub fn types(cx: &mut Cx, node: Node) -> Vec<ComponentType> {
-    let entries = members(cx, node, "`types`", "types: { Gain: { ports: {...} } }");
+    let entries = entries(cx, node, "`types`", "types: { Gain: { ports: {...} } }");
     entries.into_iter().filter_map(|entry| component_type(cx, entry)).collect()
-}
-
-fn members(cx: &mut Cx, node: Node, what: &str, example: &str) -> Vec<Entry> {
-    match node.kind {
-        Kind::Map(entries) => entries,
-        _ => {
-            cx.wrong(&node, what, "a table of named values", example);
-            Vec::new()
-        }
-    }
 }
 
 fn component_type(cx: &mut Cx, entry: Entry) -> Option<ComponentType> {
@@ -92,7 +82,7 @@ fn named<T>(
     one: impl Fn(&mut Cx, Entry) -> Option<T>,
 ) -> BTreeMap<Ident, T> {
     let mut out = BTreeMap::new();
-    for entry in members(cx, node, what, example) {
+    for entry in entries(cx, node, what, example) {
         let key = Node::new(Kind::Str(entry.key.to_string().into()), entry.origin);
         let ident = name::<Ident>(cx, &key, "a member of a component type", example);
         if let (Some(ident), Some(member)) = (ident, one(cx, entry)) {

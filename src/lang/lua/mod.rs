@@ -51,11 +51,10 @@ pub fn read(cx: &mut Cx, reading: Reading, params: &mut Params, stem: &str, load
         cx.refuse(finding.help("only texts are read: give the source file"));
         return None;
     }
-    let mut recorder = Recorder::new(std::mem::take(cx), reading, std::mem::take(params));
-    recorder.loads = loads;
+    let recorder = Recorder::new(std::mem::take(cx), reading, std::mem::take(params), loads);
     let shared: SharedRecorder = Rc::new(RefCell::new(recorder));
     let outcome = run(&shared, &text);
-    let mut recorder = std::mem::replace(&mut *shared.borrow_mut(), Recorder::empty(reading));
+    let mut recorder = shared.take();
     let ran = match outcome {
         Ok(returned) => {
             if let Some(exhausted) = recorder.exhausted.take() {
@@ -134,32 +133,7 @@ impl Recorder {
                 None
             }
         };
-        let mut named: Vec<(u32, Entry)> = Vec::new();
-        let mut confs = 0;
-        for index in 0..self.made.len() {
-            if self.made[index].verb != "ConfiguratorConf" {
-                continue;
-            }
-            confs += 1;
-            self.made[index].uses += 1;
-            let Kind::Made(_, entries, _) = self.take(index).kind else { continue };
-            for entry in entries {
-                match entry.value.kind {
-                    Kind::Handle(handle) if self.made[handle as usize].verb == "Configuration" => {
-                        named.push((handle, entry));
-                    }
-                    Kind::Poison => {}
-                    _ => {
-                        let what = format!("`{}`", entry.key);
-                        let mut value = entry.value;
-                        value.origin = entry.origin;
-                        self.cx.wrong(&value, &what, "a configuration", "name = Configuration { … }");
-                    }
-                }
-            }
-        }
-        // Lua forgets the order of named entries; the order in which the values were made is the written one.
-        named.sort_by_key(|(handle, entry)| (*handle, entry.key.clone()));
+        let (confs, named) = self.named("ConfiguratorConf", "Configuration", "a configuration");
         let mut entries = Vec::with_capacity(named.len());
         for (handle, mut entry) in named {
             entry.value = self.take(handle as usize);
@@ -172,6 +146,34 @@ impl Recorder {
         let some = confs > 0 || !entries.is_empty();
         let whole = self.reading.whole;
         Made { configurations: some.then(|| Node::new(Kind::Map(entries), whole)), chart, monitors }
+    }
+
+    /// How often a list of that verb was made, and the entries of all of them, in the order in which they were written.
+    fn named(&mut self, list: &str, element: &str, what: &str) -> (usize, Vec<(u32, Entry)>) {
+        let mut named: Vec<(u32, Entry)> = Vec::new();
+        let mut lists = 0;
+        for index in 0..self.made.len() {
+            if self.made[index].verb != list {
+                continue;
+            }
+            lists += 1;
+            self.made[index].uses += 1;
+            let Kind::Made(_, entries, _) = self.take(index).kind else { continue };
+            for entry in entries {
+                match entry.value.kind {
+                    Kind::Handle(handle) if self.made[handle as usize].verb == element => named.push((handle, entry)),
+                    Kind::Poison => {}
+                    _ => {
+                        let value = Node::new(entry.value.kind, entry.origin);
+                        let example = format!("name = {element} {{ … }}");
+                        self.cx.wrong(&value, &format!("`{}`", entry.key), what, &example);
+                    }
+                }
+            }
+        }
+        // Lua forgets the order of named entries; the order in which the values were made is the written one.
+        named.sort_by_key(|(handle, entry)| (*handle, entry.key.clone()));
+        (lists, named)
     }
 
     /// The paper's first listing is a `Configuration` alone in its file: it takes the file's name.

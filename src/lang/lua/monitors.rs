@@ -3,7 +3,7 @@
 use super::constructors::of_a_table;
 use super::recorder::{Recorder, SharedRecorder};
 use super::{convert, sandbox};
-use crate::lang::tree::{Entry, Kind, Node};
+use crate::lang::tree::{Kind, Node};
 use crate::lang::words::{self, CONDITIONS, SIGNALS, Word};
 use crate::limits;
 use crate::model::{Finding, codes};
@@ -77,30 +77,7 @@ pub fn compared(shared: &SharedRecorder, lua: &Lua, sides: [&Value; 2]) {
 impl Recorder {
     /// The named monitors of the file, in the order they were made; none when it has no `Monitors`.
     pub fn monitors(&mut self) -> Option<Node> {
-        let mut named: Vec<(u32, Entry)> = Vec::new();
-        let mut some = false;
-        for index in 0..self.made.len() {
-            if self.made[index].verb != "Monitors" {
-                continue;
-            }
-            some = true;
-            self.made[index].uses += 1;
-            let Kind::Made(_, entries, _) = self.take(index).kind else { continue };
-            for entry in entries {
-                match entry.value.kind {
-                    Kind::Handle(handle) if self.made[handle as usize].verb == "monitor" => named.push((handle, entry)),
-                    Kind::Poison => {}
-                    _ => {
-                        let what = format!("`{}`", entry.key);
-                        let mut value = entry.value;
-                        value.origin = entry.origin;
-                        self.cx.wrong(&value, &what, "a monitor", "name = monitor { … }");
-                    }
-                }
-            }
-        }
-        // Lua forgets the order of named entries; the order in which the values were made is the written one.
-        named.sort_by_key(|(handle, entry)| (*handle, entry.key.clone()));
+        let (lists, named) = self.named("Monitors", "monitor", "a monitor");
         let mut entries = Vec::with_capacity(named.len());
         for (handle, mut entry) in named {
             let mut value = Node::new(Kind::Handle(handle), entry.origin);
@@ -109,7 +86,7 @@ impl Recorder {
             entry.origin = self.cx.part(entry.value.origin, &entry.key);
             entries.push(entry);
         }
-        some.then(|| Node::new(Kind::Map(entries), self.reading.whole))
+        (lists > 0).then(|| Node::new(Kind::Map(entries), self.reading.whole))
     }
 
     /// Puts what was made into its places, at every depth. What stands in several places is copied, under the budget.

@@ -43,6 +43,7 @@ pub struct Exhausted {
 }
 
 /// The state of one run.
+#[derive(Default)]
 pub struct Recorder {
     pub cx: Cx,
     pub reading: Reading,
@@ -70,28 +71,8 @@ pub struct Recorder {
 
 impl Recorder {
     /// One for a file.
-    pub fn new(cx: Cx, reading: Reading, params: Params) -> Self {
-        Self {
-            cx,
-            reading,
-            params,
-            made: Vec::new(),
-            classed: FxHashMap::default(),
-            nodes: 0,
-            instructions: 0,
-            exhausted: None,
-            undefined: FxHashSet::default(),
-            parsing: false,
-            loads: None,
-            loading: Vec::new(),
-            line: 0,
-            on_line: Vec::new(),
-        }
-    }
-
-    /// What is left where one was taken away.
-    pub fn empty(reading: Reading) -> Self {
-        Self::new(Cx::default(), reading, Params::default())
+    pub fn new(cx: Cx, reading: Reading, params: Params, loads: Option<super::Loads>) -> Self {
+        Self { cx, reading, params, loads, ..Self::default() }
     }
 
     /// The place of a call of `word` on a line.

@@ -1,6 +1,7 @@
 //! One change in both languages, by what the grammar says of it: which parts it has, and which of them Lua has as arguments.
 
-use super::{lua, yaml};
+use super::fields;
+use crate::diagnostics::Language;
 use crate::lang::grammar::primitive;
 use crate::model::{Call, ChangeKind, Ident, Policy, Value};
 use std::collections::BTreeMap;
@@ -64,65 +65,52 @@ pub fn in_lua(kind: &ChangeKind) -> String {
     let (undo, parts): (Vec<_>, Vec<_>) = parts.into_iter().partition(|(_, part)| matches!(part, Operand::Call(_)));
     // What is no argument stands in a table behind them.
     let takes = |key: &str| arguments.iter().any(|argument| argument.trim_end_matches('…') == key);
-    let (own, options): (Vec<_>, Vec<_>) = parts.iter().partition(|(key, _)| takes(key));
-    let mut written: Vec<String> = own.iter().map(|(_, part)| part.lua()).collect();
+    let written = parts.iter().map(|(key, part)| (*key, part.written(Language::Lua)));
+    let (own, options): (Vec<_>, Vec<_>) = written.partition(|(key, _)| takes(key));
+    let mut written: Vec<String> = own.into_iter().map(|(_, part)| part).collect();
     if !options.is_empty() {
-        let options: Vec<String> = options.iter().map(|(key, part)| format!("{key} = {}", part.lua())).collect();
-        written.push(format!("{{ {} }}", options.join(", ")));
+        written.push(fields::table(options, Language::Lua));
     }
     _ = write!(out, "({})", written.join(", "));
     for (key, part) in undo {
-        _ = write!(out, ":{key}({})", part.lua());
+        _ = write!(out, ":{key}({})", part.written(Language::Lua));
     }
     out
 }
 
 /// `create: { component: A, type: T, activity: control }`
 pub fn in_yaml(kind: &ChangeKind) -> String {
-    format!("{}: {{ {} }}", kind.verb(), keys(&parts(kind)))
+    format!("{}: {}", kind.verb(), keys(&parts(kind)))
 }
 
 fn keys(parts: &[(&'static str, Operand<'_>)]) -> String {
-    parts.iter().map(|(key, part)| format!("{key}: {}", part.yaml())).collect::<Vec<_>>().join(", ")
+    fields::table(parts.iter().map(|(key, part)| (*key, part.written(Language::Yaml))), Language::Yaml)
 }
 
 impl Operand<'_> {
-    fn lua(&self) -> String {
-        let written = |value: &Value| {
-            let mut out = String::new();
-            lua::value(&mut out, value);
-            out
-        };
-        let table = |fields: Vec<String>| format!("{{ {} }}", fields.join(", "));
+    fn written(&self, language: Language) -> String {
+        let text = |text: &str| fields::text(text, language);
         match self {
-            Self::Name(name) => lua::quoted(name),
-            Self::Value(value) => written(value),
-            Self::Args(args) => args.iter().map(written).collect::<Vec<_>>().join(", "),
+            Self::Name(name) => text(name),
+            Self::Value(value) => fields::value(value, language),
+            Self::Args(args) => {
+                let args: Vec<String> = args.iter().map(|value| fields::value(value, language)).collect();
+                // In Lua they are arguments of the call.
+                if language == Language::Lua { args.join(", ") } else { fields::list(&args, language) }
+            }
             Self::Values(values) => {
-                table(values.iter().map(|(name, v)| format!("{} = {}", lua::key(name.as_str()), written(v))).collect())
+                let values = values.iter().map(|(name, value)| (name.as_str(), fields::value(value, language)));
+                fields::table(values, language)
             }
             Self::Names(names) => {
-                let one = |(from, to): (&Ident, &Ident)| {
-                    format!("{} = {}", lua::key(from.as_str()), lua::quoted(to.as_str()))
-                };
-                table(names.iter().map(one).collect())
+                fields::table(names.iter().map(|(from, to)| (from.as_str(), text(to.as_str()))), language)
             }
-            Self::Policy(Policy::Data) => lua::quoted("data"),
-            Self::Policy(Policy::Buffer(n)) => format!("{{ buffer = {n} }}"),
-            Self::Call(call) => called(call).iter().map(|(_, part)| part.lua()).collect::<Vec<_>>().join(", "),
-        }
-    }
-
-    fn yaml(&self) -> String {
-        match self {
-            Self::Name(name) => yaml::t(name),
-            Self::Value(value) => yaml::value(value),
-            Self::Args(args) => yaml::list(args.iter().map(yaml::value)),
-            Self::Values(values) => yaml::value_map(values.iter().map(|(name, v)| (name, yaml::value(v)))),
-            Self::Names(names) => yaml::value_map(names.iter().map(|(from, to)| (from, yaml::t(to)))),
-            Self::Policy(Policy::Data) => "data".to_owned(),
-            Self::Policy(Policy::Buffer(n)) => format!("{{ buffer: {n} }}"),
-            Self::Call(call) => format!("{{ {} }}", keys(&called(call))),
+            Self::Policy(Policy::Data) => text("data"),
+            Self::Policy(Policy::Buffer(n)) => fields::table([("buffer", n.to_string())], language),
+            Self::Call(call) if language == Language::Lua => {
+                called(call).iter().map(|(_, part)| part.written(language)).collect::<Vec<_>>().join(", ")
+            }
+            Self::Call(call) => keys(&called(call)),
         }
     }
 }

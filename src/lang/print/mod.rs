@@ -2,6 +2,7 @@
 //! way things were written (loops, parameters, one file or several) are not part of a model and are lost.
 
 mod change;
+mod fields;
 mod kept;
 mod lua;
 mod monitor;

@@ -1,27 +1,13 @@
 //! Printing monitors: both languages write the same words.
 
+use super::fields::{self, list, text};
 use super::wrap::wrap;
 use super::{float, lua, seconds, yaml};
 use crate::diagnostics::Language;
 use crate::model::Monitor;
-use crate::model::monitor::{Condition, ConditionKind, Interval, MonitoredSignal, Sampling, SignalKind};
+use crate::model::monitor::{Condition, ConditionKind, Interval, MonitoredSignal, SignalKind};
 use std::collections::HashMap;
 use std::fmt::Write as _;
-
-/// A text in quotes where the language wants them.
-fn text(t: &str, language: Language) -> String {
-    match language {
-        Language::Lua => lua::quoted(t),
-        Language::Yaml | Language::Scxml => yaml::text(t),
-    }
-}
-
-fn list(items: &[String], language: Language) -> String {
-    match language {
-        Language::Lua => format!("{{ {} }}", items.join(", ")),
-        Language::Yaml | Language::Scxml => format!("[{}]", items.join(", ")),
-    }
-}
 
 /// A word with its arguments.
 fn call(word: &str, args: &[String], language: Language) -> String {
@@ -167,8 +153,7 @@ fn plain(c: &Condition, l: Language, shared: &mut CommonConditions) -> String {
         K::Compare { left, op, right, hysteresis } => {
             let mut args = vec![signal(left, l), signal(right, l)];
             if let Some(h) = hysteresis {
-                let is = if l == Language::Lua { " =" } else { ":" };
-                args.push(format!("{{ hysteresis{is} {} }}", float(*h)));
+                args.push(fields::table([("hysteresis", float(*h))], l));
             }
             call(op.word(), &args, l)
         }
@@ -204,30 +189,9 @@ pub fn monitors(list: &[Monitor], language: Language) -> String {
         } else {
             _ = writeln!(out, "  {}:", yaml::text(m.name.as_str()));
         }
-        let mut part = |key: &str, value: String| {
-            _ = if is_lua { writeln!(out, "    {key} = {value},") } else { writeln!(out, "    {key}: {value}") };
-        };
-        if let Some(description) = &m.description {
-            part("description", if is_lua { lua::quoted(description) } else { yaml::quoted(description) });
-        }
-        let when = shared.print(&m.when, language);
         // In YAML every line of a value stands further right than its key.
-        part("when", wrap(&when, 11, if is_lua { 4 } else { 6 }));
-        if let Some(raise) = m.raise {
-            part("event", text(raise.as_str(), language));
-        }
-        if let Some(cleared) = m.cleared {
-            part("cleared", text(cleared.as_str(), language));
-        }
-        if let Some(repeat) = m.repeat {
-            part("repeat_every", seconds(repeat));
-        }
-        if let Sampling::Every(period) = m.sampling {
-            part("every", seconds(period));
-        }
-        if !m.enabled {
-            part("enabled", "false".to_owned());
-        }
+        let when = wrap(&shared.print(&m.when, language), 11, if is_lua { 4 } else { 6 });
+        fields::lines(&mut out, "    ", fields::of_monitor(m, language, when), language);
         if is_lua {
             out.push_str("  },\n");
         }

@@ -2,12 +2,13 @@
 
 use super::monitor::{self, CommonConditions};
 use super::wrap::wrap;
-use super::{change, float, milliseconds, seconds};
+use super::{change, fields, float, milliseconds, seconds};
 use crate::diagnostics::Language;
-use crate::model::statechart::{Action, ChartNode, ChartTransition, State, Trigger};
+use crate::model::monitor::Condition;
+use crate::model::statechart::{ChartNode, State};
 use crate::model::{
-    ComponentType, Configuration, Coordinator, CoordinatorNaming, Deployment, Direction, Effect, ExportKind, Ident,
-    Interface, OnFailure, Origin, StateList, Statechart, Tunable, Value,
+    ComponentType, Configuration, Coordinator, CoordinatorNaming, Deployment, Effect, ExportKind, Ident, Interface,
+    Statechart, Tunable, Value,
 };
 use std::fmt::{Display, Write as _};
 
@@ -72,13 +73,6 @@ pub fn list(texts: impl IntoIterator<Item = String>) -> String {
     format!("[{}]", texts.into_iter().collect::<Vec<_>>().join(", "))
 }
 
-fn states(out: &mut String, name: &str, entries: &StateList) {
-    if !entries.is_empty() {
-        let entries = list(entries.iter().map(|e| quoted(&format!("{}:{}", e.target, e.state))));
-        _ = writeln!(out, "    {name}: {entries}");
-    }
-}
-
 /// `configurations: …`
 pub fn configurations_yaml(configurations: &[Configuration]) -> String {
     if configurations.is_empty() {
@@ -88,41 +82,16 @@ pub fn configurations_yaml(configurations: &[Configuration]) -> String {
     let mut shared = CommonConditions::of(configurations.iter().filter_map(|c| c.holds.as_ref()), Language::Yaml);
     for c in configurations {
         let mut body = String::new();
-        if let Some(description) = &c.description {
-            _ = writeln!(body, "    description: {}", quoted(description));
-        }
-        if let Some(time) = c.timeout {
-            _ = writeln!(body, "    timeout: {}", seconds(time));
-        }
-        if let Some(group) = c.group {
-            _ = writeln!(body, "    group: {}", t(&group));
-        }
-        if c.safe {
-            body.push_str("    safe: true\n");
-        }
-        match c.on_failure {
-            OnFailure::Unset => {}
-            OnFailure::Rollback => body.push_str("    on_failure: rollback\n"),
-            OnFailure::Hold => body.push_str("    on_failure: hold\n"),
-        }
-        if let Some(condition) = &c.holds {
-            _ = writeln!(body, "    holds: {}", wrap(&shared.print(condition, Language::Yaml), 11, 6));
-        }
-        if let Some(confirm) = &c.confirm {
-            let (event, within) = (t(&confirm.event), seconds(confirm.within));
-            _ = writeln!(body, "    confirm: {{ event: {event}, within: {within} }}");
-        }
-        if c.irreversible {
-            body.push_str("    irreversible: true\n");
-        }
-        states(&mut body, "pre_conf_state", &c.pre);
+        let holds = |of: &Condition| wrap(&shared.print(of, Language::Yaml), 11, 6);
+        let [before, behind] = fields::of_configuration(c, Language::Yaml, holds);
+        fields::lines(&mut body, "    ", before, Language::Yaml);
         if !c.changes.is_empty() {
             body.push_str("    changes:\n");
             for c in &c.changes {
                 _ = writeln!(body, "      - {}", change::in_yaml(&c.kind));
             }
         }
-        states(&mut body, "post_conf_state", &c.post);
+        fields::lines(&mut body, "    ", behind, Language::Yaml);
         let id = t(&c.id);
         if body.is_empty() {
             _ = writeln!(out, "  {id}: {{}}");
@@ -133,51 +102,10 @@ pub fn configurations_yaml(configurations: &[Configuration]) -> String {
     out
 }
 
-fn raised(actions: &[(Action, Origin)]) -> Vec<String> {
-    let one = |(action, _): &(Action, Origin)| match action {
-        Action::Raise(event) => Some(t(event)),
-        Action::Function(_) => None,
-    };
-    actions.iter().filter_map(one).collect()
-}
-
-fn transition(tr: &ChartTransition) -> String {
-    let mut parts = Vec::new();
-    for (name, reference) in [("src", &tr.src), ("tgt", &tr.tgt)] {
-        if let Some((path, _)) = reference {
-            parts.push(format!("{name}: {}", text(path)));
-        }
-    }
-    let events = tr.events.iter().filter(|(trigger, _)| !matches!(trigger, Trigger::Predicate(_)));
-    let events: Vec<_> = events.map(|(trigger, _)| t(trigger)).collect();
-    if !events.is_empty() {
-        parts.push(format!("events: {}", list(events)));
-    }
-    let effect = raised(&tr.effect);
-    if !effect.is_empty() {
-        parts.push(format!("effect: {}", list(effect)));
-    }
-    if tr.pn != 0.0 {
-        parts.push(format!("pn: {}", float(tr.pn)));
-    }
-    if let Some(doc) = &tr.doc {
-        parts.push(format!("doc: {}", quoted(doc)));
-    }
-    if parts.is_empty() { "{}".to_owned() } else { format!("{{ {} }}", parts.join(", ")) }
-}
-
 fn state(out: &mut String, s: &State, indent: usize) {
     let pad = "  ".repeat(indent);
     let mut body = String::new();
-    if let Some(doc) = &s.doc {
-        _ = writeln!(body, "{pad}doc: {}", quoted(doc));
-    }
-    let config: Vec<String> = s.config.iter().map(|(id, _)| t(id)).collect();
-    for (name, names) in [("config", config), ("entry", raised(&s.entry)), ("exit", raised(&s.exit))] {
-        if !names.is_empty() {
-            _ = writeln!(body, "{pad}{name}: {}", list(names));
-        }
-    }
+    fields::lines(&mut body, &pad, fields::of_state(s, Language::Yaml), Language::Yaml);
     if !s.children.is_empty() {
         _ = writeln!(body, "{pad}states:");
         for child in &s.children {
@@ -194,7 +122,8 @@ fn state(out: &mut String, s: &State, indent: usize) {
     if !s.transitions.is_empty() {
         _ = writeln!(body, "{pad}transitions:");
         for t in &s.transitions {
-            _ = writeln!(body, "{pad}  - {}", transition(t));
+            let keys = fields::table(fields::of_transition(t, Language::Yaml), Language::Yaml);
+            _ = writeln!(body, "{pad}  - {keys}");
         }
     }
     if body.is_empty() {
@@ -251,10 +180,7 @@ fn component_type(out: &mut String, ty: &ComponentType) {
         body.push_str("    ports:\n");
     }
     for (name, port) in &ty.ports {
-        let direction = match port.direction {
-            Direction::In => "in",
-            Direction::Out => "out",
-        };
+        let direction = port.direction.word();
         let buffered = if port.buffered { ", buffered: true" } else { "" };
         let required = if port.required { ", required: true" } else { "" };
         let (ty, unit, doc) = (text(&port.ty.to_string()), unit(&port.unit), doc(&port.doc));

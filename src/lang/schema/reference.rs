@@ -7,7 +7,7 @@ use serde::Serialize;
 use std::fmt::Write as _;
 
 /// What `davit explain` tells of something that can be written.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Default, Serialize)]
 pub struct ReferenceEntry {
     /// Its name: `timeout`.
     pub name: &'static str,
@@ -48,7 +48,7 @@ impl ReferenceEntry {
 }
 
 /// A line as it is written.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Default, Serialize)]
 pub struct Example {
     /// In YAML; none: it cannot be written there.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -89,48 +89,33 @@ fn of_object(object: &Object) -> ReferenceEntry {
     let keys: Vec<_> = object.names().map(|name| format!("`{name}`")).collect();
     ReferenceEntry {
         name: object.name,
-        of: None,
         form: format!("a table with {}", keys.join(", ")),
-        unit: "",
-        required: false,
-        instead: "",
-        default: "",
         doc: object.doc,
         example: Example {
             yaml: Some(object.yaml()),
             lua: as_yaml(object.example).is_some().then_some(object.example),
         },
-        refused: None,
+        ..ReferenceEntry::default()
     }
 }
 
 fn of_word(word: &Word, what: &str) -> ReferenceEntry {
     ReferenceEntry {
         name: word.name,
-        of: None,
         form: format!("{what} of the monitors' language"),
-        unit: "",
-        required: false,
-        instead: "",
-        default: "",
         doc: word.doc,
         example: Example::of(word.usage, Languages::All),
-        refused: None,
+        ..ReferenceEntry::default()
     }
 }
 
 fn of_own_word(term: &OwnWord) -> ReferenceEntry {
     ReferenceEntry {
         name: term.name,
-        of: None,
         form: term.form.to_owned(),
-        unit: "",
-        required: false,
-        instead: "",
-        default: "",
         doc: term.doc,
         example: Example::of(term.example, term.language),
-        refused: None,
+        ..ReferenceEntry::default()
     }
 }
 

@@ -49,7 +49,7 @@ impl<'t> ScxmlReader<'_, 't> {
             }
             let Some(event) = element.attribute("event") else {
                 let help = "write the event's name: `<send event=\"e_ready\" target=\"#_parent\"/>`";
-                self.report(element, codes::SCXML_NO_COUNTERPART, "an event without a fixed name".to_owned(), help);
+                self.no_counterpart(element, "an event without a fixed name", help);
                 continue;
             };
             if let Some(delay) = element.attribute("delay") {
@@ -65,12 +65,7 @@ impl<'t> ScxmlReader<'_, 't> {
                 continue;
             }
             if computed {
-                self.report(
-                    element,
-                    codes::SCXML_NO_COUNTERPART,
-                    "a delay that is computed".to_owned(),
-                    "write the time: `delay=\"0.5s\"`",
-                );
+                self.no_counterpart(element, "a delay that is computed", "write the time: `delay=\"0.5s\"`");
                 continue;
             }
             match element.attribute("target") {
@@ -115,7 +110,7 @@ impl<'t> ScxmlReader<'_, 't> {
         }
         let name_sought = if to_itself { "raise" } else { name };
         if let Some((_, help)) = NO_COUNTERPART.iter().find(|(none, _)| *none == name_sought) {
-            self.report(element, codes::SCXML_NO_COUNTERPART, format!("`{name}` has no counterpart here"), help);
+            self.no_counterpart(element, format!("`{name}` has no counterpart here"), help);
         } else if name == "datamodel" {
             self.others(element);
         } else if !KNOWN.contains(&name) {

@@ -111,9 +111,13 @@ impl<'t> ScxmlReader<'_, 't> {
         self.places.place(self.cx, start, u32::try_from(length).unwrap_or(1))
     }
 
-    fn report(&mut self, element: Element<'_, 't>, code: Code, message: String, help: &str) {
+    fn report(&mut self, element: Element<'_, 't>, code: Code, message: impl Into<String>, help: &str) {
         let origin = self.at(element);
         self.cx.report(Finding::error(code, message).at(origin).help(help));
+    }
+
+    fn no_counterpart(&mut self, element: Element<'_, 't>, message: impl Into<String>, help: &str) {
+        self.report(element, codes::SCXML_NO_COUNTERPART, message, help);
     }
 
     fn warn(&mut self, element: Element<'_, 't>, code: Code, message: String, help: &str) {
@@ -150,7 +154,7 @@ impl<'t> ScxmlReader<'_, 't> {
             self.report(
                 root,
                 codes::TEXT_NOTHING,
-                "there is no state in this document".to_owned(),
+                "there is no state in this document",
                 "write `<state id=\"idle\"/>`",
             );
         }
@@ -228,12 +232,7 @@ impl<'t> ScxmlReader<'_, 't> {
         self.others(element);
         if fqn == ROOT {
             for child in element.children().filter(|c| c.has_tag_name((SCXML, "transition"))) {
-                self.report(
-                    child,
-                    codes::SCXML_NO_COUNTERPART,
-                    "the outermost state has no transitions".to_owned(),
-                    "write it at a state inside",
-                );
+                self.no_counterpart(child, "the outermost state has no transitions", "write it at a state inside");
             }
         }
         let transitions = element.children().filter(|c| c.has_tag_name((SCXML, "transition")));
@@ -242,9 +241,8 @@ impl<'t> ScxmlReader<'_, 't> {
         for event in delayed.keys() {
             if !heard.contains(event.as_str()) {
                 let message = format!("`{event}` is sent later, and no transition of this state waits for it");
-                self.report(
+                self.no_counterpart(
                     element,
-                    codes::SCXML_NO_COUNTERPART,
                     message,
                     "a time event (`e_after`) belongs to a transition of the state itself",
                 );
@@ -271,10 +269,9 @@ impl<'t> ScxmlReader<'_, 't> {
         self.in_document_order(&mut list);
         state.transitions.extend(list);
         if own(element, "doo").is_some() {
-            self.report(
+            self.no_counterpart(
                 element,
-                codes::SCXML_NO_COUNTERPART,
-                "an activity that was left out".to_owned(),
+                "an activity that was left out",
                 "read the coordinator from the Lua file that has it",
             );
         }
@@ -300,7 +297,7 @@ impl<'t> ScxmlReader<'_, 't> {
             self.report(
                 written,
                 codes::TEXT_MISSING_KEY,
-                "`initial` holds no transition".to_owned(),
+                "`initial` holds no transition",
                 "write `<transition target=\"…\"/>` in it",
             );
             return;

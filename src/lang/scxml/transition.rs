@@ -23,12 +23,7 @@ impl<'t> ScxmlReader<'_, 't> {
         let mut all = ids.split_whitespace();
         let (first, more) = (all.next()?, all.next());
         if more.is_some() {
-            self.report(
-                element,
-                codes::SCXML_NO_COUNTERPART,
-                "several targets are entered in parallel".to_owned(),
-                NO_COUNTERPART[0].1,
-            );
+            self.no_counterpart(element, "several targets are entered in parallel", NO_COUNTERPART[0].1);
             return None;
         }
         match self.ids.get(first) {
@@ -57,30 +52,25 @@ impl<'t> ScxmlReader<'_, 't> {
         let origin = self.at(element);
         let Some(ids) = element.attribute("target") else {
             let help = "a transition always leads somewhere: raise the names on the entry of a state";
-            self.report(element, codes::SCXML_NO_COUNTERPART, "a transition without a target".to_owned(), help);
+            self.no_counterpart(element, "a transition without a target", help);
             return None;
         };
         let target = self.one_target(element, ids)?;
         if own(element, "function").is_some() {
             let help = "read the coordinator from the Lua file that has it";
-            self.report(element, codes::SCXML_NO_COUNTERPART, "a condition that was left out".to_owned(), help);
+            self.no_counterpart(element, "a condition that was left out", help);
             return None;
         }
         if element.attribute("cond").is_some() && own(element, "event").is_none() {
             let help = "let what decides raise one event or another";
-            self.report(element, codes::SCXML_NO_COUNTERPART, "a condition on data".to_owned(), help);
+            self.no_counterpart(element, "a condition on data", help);
             return None;
         }
         let inside = target.strip_prefix(fqn).is_some_and(|rest| rest.starts_with('.'));
         if element.attribute("type") == Some("internal") && inside && src != INITIAL && source.children().any(is_state)
         {
             let help = "here the state is left and entered again; write the transition at the states inside";
-            self.report(
-                element,
-                codes::SCXML_NO_COUNTERPART,
-                "an internal transition of a state around its target".to_owned(),
-                help,
-            );
+            self.no_counterpart(element, "an internal transition of a state around its target", help);
             return None;
         }
         let leads_back = !self.ours && fqn.strip_prefix(&target).is_some_and(|rest| rest.starts_with('.'));
@@ -104,7 +94,7 @@ impl<'t> ScxmlReader<'_, 't> {
             if !self.ours {
                 let message = "`*` would also mean the state's own completion here, so it would be taken at once";
                 let help = "list the events that are meant";
-                self.report(element, codes::SCXML_NO_COUNTERPART, message.to_owned(), help);
+                self.no_counterpart(element, message, help);
                 return None;
             }
             out.events.clear();
@@ -115,12 +105,7 @@ impl<'t> ScxmlReader<'_, 't> {
         let (effect, timers) = self.actions(element);
         if let Some(event) = timers.keys().next() {
             let message = format!("`{event}` is sent later by a transition");
-            self.report(
-                element,
-                codes::SCXML_NO_COUNTERPART,
-                message,
-                "send it on the entry of the state that waits for it",
-            );
+            self.no_counterpart(element, message, "send it on the entry of the state that waits for it");
         }
         out.effect = effect;
         Some(out)
@@ -143,7 +128,7 @@ impl<'t> ScxmlReader<'_, 't> {
             let finals = self.finals.get(id).cloned().unwrap_or_default();
             if finals.is_empty() {
                 let help = "give the state a `<final>` inside: its completion is that of one of those";
-                self.report(element, codes::SCXML_NO_COUNTERPART, format!("`{event}` never comes"), help);
+                self.no_counterpart(element, format!("`{event}` never comes"), help);
             }
             let names = finals.iter().filter_map(|fqn| EventName::new(&format!("e_done@{fqn}")).ok());
             out.events.extend(names.map(|name| (Trigger::Event(name), out.origin)));
