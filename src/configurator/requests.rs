@@ -9,8 +9,8 @@ use super::request::{Reason, Request};
 use super::running::{Purpose, Running};
 use crate::model::{Ask, ConfigId, RequestId, Verdict};
 use crate::stack::{
-    About, Batch, Broken, Endings, Frame, FrameId, Gone, Group, Part, Pile, Planned, Requester, Rules, Stopped, Why,
-    settle, take_up,
+    About, Batch, Broken, Endings, Frame, FrameId, Gone, Group, Part, Pile, Planned, Rules, Stopped, Why, settle,
+    take_up,
 };
 use crate::time::Time;
 use crate::transaction::{BrokenPart, Input, Limit, PartEnd, Spec, Transaction};

@@ -192,6 +192,12 @@ impl Stack {
         }
     }
 
+    /// The same, with memory for so many piles that are full.
+    pub fn for_piles(mut self, piles: usize) -> Self {
+        self.frames.reserve_exact(self.bound.saturating_mul(piles).min(4096));
+        self
+    }
+
     /// The same, and of the same frames it is squashed once, in it and all its copies: for whoever follows thousands of them.
     pub fn remembering(bound: usize) -> Self {
         Self { memory: Some(squash::Memory::default()), ..Self::new(bound) }

@@ -121,9 +121,14 @@ pub(super) fn called_again<'f>(by: &'f Configuration, frame: &'f Frame) -> impl 
     calls(frame).filter(move |operation| by.safe && calls_too(operation)).map(Slot::Operation)
 }
 
-/// Whether a floor holds back a frame below it: one of its own file that shares a component with it.
+/// Whether a floor may hold back a frame: one of its own file; what is safe is for all.
+fn reaches(floor: &Frame, frame: &Frame) -> bool {
+    floor.safe || floor.is_of_a_file_of(frame)
+}
+
+/// Whether a floor holds back a frame below it, which shares a component with it.
 pub(super) fn holds_back(floor: &Frame, frame: &Frame) -> bool {
-    floor.is_of_a_file_of(frame) && meet(&components(&frame.footprint), &floor.footprint)
+    reaches(floor, frame) && meet(&components(&frame.footprint), &floor.footprint)
 }
 
 /// Whether the frame at `at` may be popped.
@@ -147,7 +152,7 @@ pub(super) fn look(frames: &[Arc<Frame>], at: usize) -> Result<HandOver, Box<Hin
         for (place, above) in frames[at..].iter().enumerate() {
             // Itself as well.
             if let Some(reason) = &above.floor
-                && (place == 0 || above.is_of_a_file_of(frame) && meet(&mine, &above.footprint))
+                && (place == 0 || reaches(above, frame) && meet(&mine, &above.footprint))
             {
                 let message = format!("`{}` cannot be undone: {reason}", frame.configuration);
                 let finding = Finding::error(codes::STACK_FLOOR, message)

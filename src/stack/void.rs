@@ -18,11 +18,11 @@ pub(super) struct Connections {
 
 impl Connections {
     /// Whether what `other` touches, a frame above `frame`, is no hindrance to the undo of that: it is about a component of the file of
-    /// `frame`, and `other` is not of that file. A connection that is there is one.
+    /// `frame`, and `other` is not of that file. A connection that is there is one, and so is whatever is safe: that is for all inside.
     pub fn pass(&mut self, frame: &Frame, other: &Frame, touch: &Touch) -> bool {
         let own = |of: ComponentName| frame.is_of_file(of.prefix()) && !other.is_of_file(of.prefix());
         let (a, b) = touch.slot.components();
-        if !own(a) && !own(b) {
+        if other.safe || !own(a) && !own(b) {
             return false;
         }
         let Slot::Link(from, to) = touch.slot else { return true };
