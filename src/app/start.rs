@@ -157,7 +157,7 @@ fn openers(checked: &Checked) -> Vec<Option<Opener>> {
     let deployment = &checked.deployment;
     let opener = |own: &Coordinator| {
         let program = deployment.programs.get(&own.name)?;
-        Some(Opener::new(program.clone(), Arc::new(own.chart.clone())))
+        Some(Opener::new(program.clone(), Arc::new(own.chart.clone())).within(own.of))
     };
     deployment.coordinators.iter().map(opener).collect()
 }

@@ -192,9 +192,6 @@ codes! {
     COMPOSE_CIRCLE = "compose::circle", "a deployment is a part of itself",
         "A subsystem's file names, directly or by others, the file that names it. Nothing could ever be built of that. Take one of \
          them out.";
-    COMPOSE_FUNCTIONS = "compose::functions", "the coordinator of a subsystem has functions",
-        "Functions of a trusted coordinator raise and see events by their names in its own file, which are others outside of it. \
-         A subsystem's coordinator is pure; that of the deployment itself may have functions.";
     COMPOSE_WORD = "compose::word", "an event has a name that is told by itself",
         "`up`, `down`, `failed` and `stranded` are told to a parent of each of its subsystems without anybody raising them \
          (`left/up`), and so is what ends in `.ignored`. A deployment cannot emit or accept an event called so. Give it another name.";

@@ -50,9 +50,9 @@ fn under(path: &str, n: usize, mut conf: Configuration) -> Configuration {
         None => name(&format!("{path}/{}", component.as_str().replace('/', "_"))),
     };
     conf.changes.iter_mut().for_each(|change| each_member(&mut change.kind, &of));
-    let entry = |entry: &StateEntry| match entry.target {
-        Target::Component(component) => StateEntry { target: Target::Component(of(component)), ..entry.clone() },
-        _ => entry.clone(),
+    let entry = |entry: StateEntry| match entry.target {
+        Target::Component(component) => StateEntry { target: Target::Component(of(component)), ..entry },
+        Target::Default => entry,
     };
     let list = |list: &StateList| StateList::of(list.iter().map(entry)).unwrap();
     (conf.pre, conf.post) = (list(&conf.pre), list(&conf.post));
