@@ -155,3 +155,88 @@ undo('tune')\nwait_answer('tune.undone', 1)\nassert(property('left/Drive.gain') 
     let ran = demo.run(&["run", "story.lua", "--clock", "simulated"]);
     assert!(ran.out.contains("as it was"), "{}{}", ran.out, ran.err);
 }
+
+/// The coordinator of a drive with functions: what they hear and send is called as in its file, and nothing is heard of a sibling.
+const RICH: &[(&str, &str)] = &[
+    (
+        "return state {\n",
+        "local function has(events, name)
+  for _, event in ipairs(events) do if event == name then return true end end
+  return false
+end
+return state {
+  pre_step_hook = function(_, events) for _, event in ipairs(events) do print('heard ' .. tostring(event)) end end,
+",
+    ),
+    (
+        "    starting = state { entry = { \"e_built\", \"run\" } },\n",
+        "    starting = state { entry = { \"e_built\", function() print('starts') end, \"run\" } },
+    settling = state { entry = function(fsm) rfsm.send_events(fsm, 'e_settled', 'e_unlisted') end },
+",
+    ),
+    (
+        "    trans { src = \"starting\", tgt = \"on\",       events = { \"run.ok\" } },\n",
+        "    trans { src = \"starting\", tgt = \"settling\", events = { \"run.ok\" } },
+    trans { src = \"settling\", tgt = \"on\", events = { \"e_settled\" } },
+",
+    ),
+    (
+        "  trans { src = \"idle\",     tgt = \"alive\",    events = { \"e_start\" } },\n",
+        "  trans { src = \"idle\", tgt = \"alive\", guard = function(_, events) return has(events, 'e_start') end, events = { \"e_start\" } },\n",
+    ),
+];
+
+fn rich() -> Demo {
+    let demo = cell();
+    let mut coordinator = example("robot_coordinator.lua");
+    for (before, after) in RICH {
+        assert!(coordinator.contains(before), "{before}");
+        coordinator = coordinator.replacen(before, after, 1);
+    }
+    demo.write("robot_coordinator.lua", &coordinator);
+    let robot = example("robot.yaml");
+    demo.write(
+        "robot.yaml",
+        &robot.replace("coordinator: robot_coordinator.lua", "coordinator: robot_coordinator.lua\ntrusted: true"),
+    );
+    demo
+}
+
+#[test]
+fn functions_of_a_subsystem_hear_and_send_by_the_names_of_their_file() {
+    let demo = rich();
+    demo.write(
+        "story.lua",
+        "deploy('cell.yaml')\nassert(state('duo/left/Drive') == 'running' and state('duo/right/Drive') == 'running')
+raise('duo/left/e_told')\nwait(0.1)\nfail('duo/left/Drive')\nwait_state('cell:idle', 5)\nassert(#stack() == 0)\nshutdown()",
+    );
+    let ran = demo.run(&["run", "story.lua", "--clock", "simulated"]);
+    assert_eq!(ran.code, 0, "{}{}", ran.out, ran.err);
+    let told = format!("{}{}", ran.out, ran.err);
+    let heard = |event: &str| told.lines().filter(|line| line.trim_end().ends_with(&format!("heard {event}"))).count();
+    for event in ["e_start", "make.ok", "run.ok", "e_settled", "e_unlisted", "e_released", "run.undone", "make.undone"]
+    {
+        assert_eq!(heard(event), 2, "{event}: {told}");
+    }
+    // From outside, and what fails: of the one alone.
+    assert_eq!((heard("e_told"), heard("Drive.faulted")), (1, 1), "{told}");
+    assert!(!told.contains("heard left/") && !told.contains("heard right/") && !told.contains("heard duo/"), "{told}");
+    // Each file is judged: what depends on functions is not verified, and that is said of the subsystem's.
+    let checked = demo.run(&["check", "cell.yaml"]);
+    assert!(checked.code == 0 && !checked.out.contains("is sound\n"), "{}{}", checked.out, checked.err);
+    assert!(format!("{}{}", checked.out, checked.err).contains("functions"), "{}{}", checked.out, checked.err);
+}
+
+/// Stepped by hand it is the same, by the names of the file and by those from outside.
+#[test]
+fn functions_of_a_subsystem_are_stepped_by_hand() {
+    let demo = rich();
+    for (args, path) in [(&["--in", "duo/left"][..], ""), (&["--of", "duo/left"][..], "duo/left/")] {
+        demo.write("events", &format!("{path}e_start\n{path}make.ok\n{path}run.ok\n"));
+        let mut all = vec!["sim", "cell.yaml", "--events", "events"];
+        all.extend(args);
+        let ran = demo.run(&all);
+        assert!(ran.code == 0 && ran.out.contains("root.alive.on"), "{args:?}: {}{}", ran.out, ran.err);
+        assert!(ran.out.contains("heard make.ok"), "{args:?}: {}", ran.out);
+    }
+}
