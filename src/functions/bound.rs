@@ -159,7 +159,8 @@ impl BoundMachine {
     /// model tell the same.
     pub fn event_text(&self, chart: &Chart, event: EventId) -> String {
         // As from outside, like everything else that is told of it.
-        if self.tables.borrow().path.is_some() && event.as_strange().is_none() {
+        let path = self.tables.borrow().path;
+        if path.is_some() && event.as_strange().is_none() {
             return chart.event_text(event);
         }
         let value = self.value(event);
@@ -168,7 +169,7 @@ impl BoundMachine {
             value => value.to_string().unwrap_or_default(),
         };
         match (without_address(&text), event.as_strange()) {
-            (None, _) => text,
+            (None, _) => path.map_or_else(|| text.clone(), |path| format!("{path}/{text}")),
             (Some(_), None) => chart.event_text(event),
             (Some(kind), Some(number)) => format!("{kind}#unlisted{}", number + 1),
         }

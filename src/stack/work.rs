@@ -281,9 +281,10 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
         taken_back.map_err(|found| drifted(&found))?;
         share::hand_over(&mut self.frames, &hand, &|id| id);
         self.frames.remove(at);
-        // What it had made is away.
+        // What it had made is away, also where what was there before is back; of what is left of one that is not known.
         let view = self.script.view();
-        let gone: Vec<ComponentName> = void::made_by(&frame).filter(|of| view.component(*of).is_none()).collect();
+        let away = |of: &ComponentName| !frame.partial || view.component(*of).is_none();
+        let gone: Vec<ComponentName> = void::made_by(&frame).filter(away).collect();
         self.is_taken_away(gone.into_iter(), edits);
         // A frame that this very transaction pushes and pops leaves no trace.
         if let Some(i) = self.pushed.iter().position(|id| *id == frame.id) {

@@ -99,3 +99,24 @@ fn a_floor_of_one_subsystem_is_none_of_another() {
     let names = |bench: &Bench| bench.stack.frames().iter().map(|f| f.configuration.to_string()).collect::<Vec<_>>();
     assert_eq!(names(&bench), ["s/make", "t/make", "t/weld"]);
 }
+
+/// What comes back in the place of what was taken away is another one: what was done to that is not undone on it.
+#[test]
+fn what_was_done_to_one_is_not_undone_on_the_one_before_it() {
+    let (mut bench, _) = two(8);
+    let swap = ChangeKind::Replace {
+        component: ComponentName::new("s/A").unwrap(),
+        ty: TypeName::new("t.Arm").unwrap(),
+        activity: None,
+        properties: BTreeMap::from([(ident("gain"), Value::Float(5.0))]),
+        map: BTreeMap::new(),
+    };
+    let swap = conf("s/swap", None, &[], vec![swap], &[]);
+    let swapped = bench.ok(&[by(&swap, "s")]).1[0];
+    let tune = conf("tune", None, &[], vec![set("s/A.gain", 1.0), set("t/A.gain", 1.0)], &[]);
+    let tuned = bench.ok(&[by(&tune, "root")]).1[0];
+    bench.ok(&[Op::Undo(swapped)]);
+    assert!(bench.value("s/A.gain").abs() < 1e-9);
+    let (steps, _) = bench.ok(&[Op::Undo(tuned)]);
+    assert_eq!(steps, ["property_set t/A.gain = 0.0"]);
+}
