@@ -1,6 +1,6 @@
 //! Laws of a stack that subsystems share: each has its own of it, and what others did to one that has gone is void.
 
-use crate::generate::{self, ConfigGene, TypeGene, config, read};
+use crate::generate::{self, ConfigGene, TypeGene, config, read_all};
 use crate::names::{id, ident, name};
 use crate::settings;
 use crate::stacks::Both;
@@ -119,7 +119,7 @@ struct Beside {
 impl Beside {
     /// Somebody of the parent's file changes what is there of both.
     fn parent(&mut self, n: usize, gene: &ConfigGene, by: Requester) {
-        let mut conf = read(gene, &self.all.system);
+        let mut conf = read_all(gene, &self.all.system);
         (conf.id, conf.group, conf.pre, conf.post) =
             (id(&format!("p{n}")), None, StateList::default(), StateList::default());
         let there = |of: ComponentName| self.all.system.component(of).is_some();
@@ -201,7 +201,7 @@ proptest! {
         let mut alone = ["s", "t"].map(|path| (path, Both::new(catalogue.clone(), bound)));
         for (n, (second, gene)) in genes.iter().enumerate() {
             let (path, own) = &mut alone[usize::from(*second)];
-            let conf = under(path, n, read(gene, &own.system));
+            let conf = under(path, n, read_all(gene, &own.system));
             let [apart, together] = [&*own, &all].map(|both| both.ask(&[push(&conf, Requester::Operator)]));
             prop_assert_eq!(apart.is_ok(), together.is_ok(), "{:?} {:?}", apart, together);
             let (Ok(apart), Ok(together)) = (apart, together) else { continue };
@@ -242,7 +242,7 @@ proptest! {
                     continue;
                 }
             };
-            let conf = under(path, n, read(gene, &apart.system));
+            let conf = under(path, n, read_all(gene, &apart.system));
             // What a parent is connected to stays what it is.
             let replaces = conf.changes.iter().any(|change| matches!(change.kind, ChangeKind::Replace { .. }));
             if replaces && is_held(&beside.all) {
