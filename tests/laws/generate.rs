@@ -46,10 +46,14 @@ pub fn configs(n: std::ops::Range<usize>) -> impl Strategy<Value = Vec<ConfigGen
     vec(config(), n)
 }
 
-const NAMES: [&str; 8] = ["a", "b", "c", "d", "e", "s/f", "s/g", "t/h"];
+const NAMES: [&str; 11] = ["a", "b", "c", "d", "e", "f", "g", "h", "s/f", "s/g", "t/h"];
+
+pub fn name(n: u8) -> ComponentName {
+    ComponentName::new(NAMES[n as usize % NAMES.len()]).unwrap()
+}
 
 /// A name of the file of that path.
-pub fn name(path: &str, n: u8) -> ComponentName {
+fn name_in(path: &str, n: u8) -> ComponentName {
     let all: Vec<ComponentName> = NAMES.iter().map(|text| ComponentName::new(text).unwrap()).collect();
     let own: Vec<ComponentName> = all.into_iter().filter(|name| name.prefix() == path).collect();
     own[n as usize % own.len()]
@@ -175,10 +179,14 @@ fn pick<T: Clone>(from: &[T], n: u8) -> Option<T> {
     (!from.is_empty()).then(|| from[n as usize % from.len()].clone())
 }
 
-/// The configuration that `gene` stands for in `system`: of the deployment's file or, a quarter, of a subsystem's. It is about components of
+/// The configuration that `gene` stands for in `system`: of the deployment's file or, one of eight, of a subsystem's. It is about components of
 /// its own file; what a file does to those of another one is what `piles` is about.
 pub fn read(gene: &ConfigGene, system: &System) -> Configuration {
-    let path = ["", "", "", "", "", "", "s", "t"][gene.id as usize / 4 % 8];
+    let path = match gene.id / 4 % 16 {
+        14 => "s",
+        15 => "t",
+        _ => "",
+    };
     let id = if path.is_empty() { format!("k{}", gene.id % 4) } else { format!("{path}/k{}", gene.id % 4) };
     Reader::new(gene, system, &id, Some(path)).read(gene)
 }
@@ -238,7 +246,7 @@ impl Reader<'_> {
                     if pre { self.there_is() } else { self.there.keys().copied().collect() };
                 match pick(&names, *who) {
                     Some(name) if who % 32 != 31 => Target::Component(name),
-                    _ if who % 4 == 3 => Target::Component(name(self.path.unwrap_or_default(), *who)),
+                    _ if who % 4 == 3 => Target::Component(name_in(self.path.unwrap_or_default(), *who)),
                     _ => continue,
                 }
             };
@@ -260,7 +268,7 @@ impl Reader<'_> {
 
     fn change(&mut self, [kind, a, b, c]: [u8; 4]) {
         match kind % 18 {
-            0..=3 => self.create(name(self.path.unwrap_or_default(), a), b, c),
+            0..=3 => self.create(name_in(self.path.unwrap_or_default(), a), b, c),
             4..=7 => self.connect(a, b, c),
             8 => {
                 let mut links = Vec::new();

@@ -77,7 +77,11 @@ fn push(configuration: &Configuration, requester: Requester) -> Op<'_> {
 }
 
 fn inside<'b>(both: &'b Both, path: &'b str) -> impl Iterator<Item = &'b Arc<Frame>> {
-    both.stack.frames().iter().filter(move |frame| frame.inside() == path)
+    let whole = move |frame: &&Arc<Frame>| {
+        let about = components(&frame.footprint);
+        frame.configuration.local(ident(path)).is_some() && about.iter().all(|of| is_in(*of, path))
+    };
+    both.stack.frames().iter().filter(whole)
 }
 
 /// The newest frame of a requester.
@@ -263,7 +267,8 @@ proptest! {
             let undo = beside.all.ask(&[Op::Undo(id)]);
             if undo.is_err() {
                 prop_assert!(is_held(&beside.all), "{:?}", undo);
-                prop_assert!(undo.unwrap_err().findings.iter().all(|finding| finding.code.0 == "stack::shared"));
+                let found = undo.unwrap_err().findings;
+                prop_assert!(found.iter().all(|finding| finding.code.0 == "stack::shared"), "{:?}", found);
                 let all = beside.undo_parents(false, |beside| beside.all.ask(&[Op::Undo(id)]).is_ok())?;
                 if beside.all.ask(&[Op::Undo(id)]).is_err() {
                     prop_assert!(!all);
