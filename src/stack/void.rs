@@ -25,7 +25,18 @@ impl Connections {
         if other.safe || !own(a) && !own(b) {
             return false;
         }
-        let Slot::Link(from, to) = touch.slot else { return true };
+        match touch.slot {
+            Slot::Link(from, to) => self.is_taken(other, from, to),
+            // Who only demands that nothing drives it has written there.
+            Slot::Drive(port) if touch.serves.is_none() => {
+                let mut touches = other.footprint.touches.iter();
+                touches.all(|touch| !matches!(touch.slot, Slot::Link(from, to) if to == port && !self.is_taken(other, from, to)))
+            }
+            _ => true,
+        }
+    }
+
+    fn is_taken(&mut self, other: &Frame, from: MemberRef, to: MemberRef) -> bool {
         match left_connected(other, from, to) {
             _ if self.taken.contains(&(from, to)) => true,
             Some(connected) => {
