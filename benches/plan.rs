@@ -143,7 +143,7 @@ fn switches(c: &mut Criterion) {
         };
         group.bench_with_input(BenchmarkId::new("prepared, apply and undo", n), &n, |b, _| {
             b.iter(|| {
-                assert!(stack.takes(&prepared) && prepared.ready(&system, requester, at, None));
+                assert!(stack.takes(&prepared, requester) && prepared.ready(&system, requester, at, None));
                 perform(&prepared, false, &mut system);
                 stack.push_switch(&mut prepared);
                 assert!(stack.is_top(&prepared) && prepared.fits(&system, true));

@@ -141,7 +141,13 @@ pub fn start_on(checked: &Checked, platform: Arc<dyn Platform>, clock: &Clock) -
         Arc::new(chart.expect("a checked deployment's coordinators compile"))
     });
     let host = checked.platform.functions_of(&platform, clock);
-    let openers = openers(checked).into_iter().map(|opener| opener.map(|opener| opener.with_host(host.clone())));
+    // What a platform offers names components as from outside: it is for the deployment's own file.
+    let own = checked.deployment.coordinators.iter().map(|own| own.of.is_none());
+    let openers = openers(checked).into_iter().zip(own);
+    let openers = openers.map(|(opener, own)| match own {
+        true => opener.map(|opener| opener.with_host(host.clone())),
+        false => opener,
+    });
     Session::start(SessionSetup {
         deployment: checked.deployment.share(),
         functions: openers.collect(),
@@ -157,7 +163,7 @@ fn openers(checked: &Checked) -> Vec<Option<Opener>> {
     let deployment = &checked.deployment;
     let opener = |own: &Coordinator| {
         let program = deployment.programs.get(&own.name)?;
-        Some(Opener::new(program.clone(), Arc::new(own.chart.clone())))
+        Some(Opener::new(program.clone(), Arc::new(own.chart.clone())).within(own.of))
     };
     deployment.coordinators.iter().map(opener).collect()
 }

@@ -178,7 +178,7 @@ pub fn coordinators(
                     of: Some(of),
                     full: Some(full),
                     path: own.of.map_or_else(String::new, |path| path.to_string()),
-                    program: d.programs.get(&own.name).cloned(),
+                    program: file.programs.get(&own.name).cloned(),
                     in_file: file.in_its_file(own).chart.clone(),
                     chart: own.chart.clone(),
                     sources: loaded.sources.clone(),

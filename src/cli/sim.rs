@@ -8,6 +8,7 @@ use super::sim_editor::edit;
 use super::{CommandContext, CommandFailure, CommandResult, Run};
 use crate::functions::Opener;
 use crate::limits::{SIM_BYTES, SIM_LINE};
+use crate::model::Ident;
 use crate::model::codes::{CLI_EVENTS_UNREADABLE, FUNCTIONS_NOT_OPENED};
 use crate::statechart::{Hook, Observation, Sim, compile};
 use serde_json::{Value as Json, json};
@@ -71,7 +72,9 @@ impl Run for Args {
             None if prompt => edit(context, || Ok(Sim::new(&chart))),
             None => self.lines(context, Sim::new(&chart), input),
             Some(program) => {
-                let opener = Opener::new(program, Arc::new(read.chart));
+                let names = read.path.split('/').filter_map(|name| Ident::new(name).ok());
+                let path = names.reduce(|outer, inner| inner.within(outer));
+                let opener = Opener::new(program, Arc::new(read.chart)).within(path);
                 if prompt {
                     let open =
                         || opener.open(None).map_err(|failure| format!("the functions cannot be run: {failure}"));

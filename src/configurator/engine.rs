@@ -377,8 +377,9 @@ impl Engine {
         let down = |all: &[Requester]| all.iter().all(|one| self.down.contains(one));
         let down: Vec<Ident> =
             self.given.subsystems.iter().filter(|(_, all)| down(all)).map(|(path, _)| *path).collect();
+        let busy = self.held_frames();
         for path in down {
-            if self.world.settle_down_in(path) {
+            if self.world.settle_down_in(path, &busy) {
                 self.counts.leads(path, false);
                 self.forget_confirmations();
                 self.changed();

@@ -85,7 +85,11 @@ impl Engine {
         };
         let fits = |Fast { switch, .. }: &mut Fast| match undoing {
             true => stack.is_top(switch) && own() && switch.fits(system, true),
-            false => allowed && stack.takes(switch) && switch.ready(system, request.requester, begun, request.scope),
+            false => {
+                allowed
+                    && stack.takes(switch, request.requester)
+                    && switch.ready(system, request.requester, begun, request.scope)
+            }
         };
         let Some(kept) = self.switches.get_mut(&id) else { return Fared::Not };
         let Some(place) = kept.iter_mut().position(fits) else { return Fared::Not };

@@ -73,6 +73,8 @@ impl Configurator {
             post.clone(),
             setup.workers.min(limits::WORKERS_MOST),
         );
+        // Each coordinator's, and operators' in each subsystem and in the deployment itself.
+        let piles = setup.coordinators.len() + setup.subsystems.len() + 1;
         let given = Given {
             clock: setup.clock.clone(),
             platform: setup.platform,
@@ -88,7 +90,7 @@ impl Configurator {
             progress: setup.progress,
             conditions: setup.conditions,
         };
-        let stack = crate::stack::Stack::new(setup.limits.stack);
+        let stack = crate::stack::Stack::new(setup.limits.stack).for_piles(piles);
         let engine = Engine::new(
             given,
             pool,

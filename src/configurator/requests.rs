@@ -9,7 +9,7 @@ use super::request::{Reason, Request};
 use super::running::{Purpose, Running};
 use crate::model::{Ask, ConfigId, RequestId, Verdict};
 use crate::stack::{
-    About, Batch, Broken, Endings, Frame, FrameId, Gone, Group, Part, Planned, Requester, Rules, Stopped, Why, settle,
+    About, Batch, Broken, Endings, Frame, FrameId, Gone, Group, Part, Pile, Planned, Rules, Stopped, Why, settle,
     take_up,
 };
 use crate::time::Time;
@@ -321,7 +321,7 @@ impl Engine {
     }
 
     /// Who asked for the pushes under way: each has its place on the stack since it began.
-    fn places_taken(&self) -> SmallVec<[Requester; 2]> {
+    fn places_taken(&self) -> SmallVec<[Pile; 2]> {
         let pushes = self.running.iter().filter(|running| !running.over);
         pushes.flat_map(|running| crate::stack::places(running.machine.planned())).collect()
     }

@@ -5,7 +5,7 @@ use super::errors::{message_of, undefined_global, without_address};
 use super::tables::{NotBuilt, Tables};
 use super::voice::Voice;
 use crate::limits;
-use crate::model::Openings;
+use crate::model::{Ident, Openings};
 use crate::statechart::{Chart, EdgeId, EventId, HookContext, Machine, NodeId, NodeKind, Printer};
 use mlua::{Function, Lua, LuaString, Result, Table, Thread, Value};
 use std::cell::{Cell, RefCell};
@@ -80,14 +80,15 @@ pub struct CallWords {
 }
 
 impl BoundMachine {
-    /// Compiles a machine's tables. `native`: the functions of the Lua part.
+    /// Compiles a machine's tables. `native`: the functions of the Lua part; `path`: see [`Tables::new`].
     pub fn new(
         lua: &Lua,
         (budget, voice): (&Rc<Budget>, &Rc<Voice>),
         native: &Table,
         fsm: &Table,
+        path: Option<Ident>,
     ) -> std::result::Result<Self, NotBuilt> {
-        let (tables, written) = Tables::new(lua, native, fsm)?;
+        let (tables, written) = Tables::new(lua, native, fsm, path)?;
         let given = |key: &str| -> Result<bool> { Ok(matches!(fsm.raw_get(key)?, Value::Function(_))) };
         let polls = given("_polls")?;
         let word = |text: &str| lua.create_string(text);
@@ -157,13 +158,18 @@ impl BoundMachine {
     /// An event in words. One that is no text has the name by which the chart knows it, never an address: two runs of one
     /// model tell the same.
     pub fn event_text(&self, chart: &Chart, event: EventId) -> String {
+        // As from outside, like everything else that is told of it.
+        let path = self.tables.borrow().path;
+        if path.is_some() && event.as_strange().is_none() {
+            return chart.event_text(event);
+        }
         let value = self.value(event);
         let text = match &value {
             Value::Nil => return chart.event_text(event),
             value => value.to_string().unwrap_or_default(),
         };
         match (without_address(&text), event.as_strange()) {
-            (None, _) => text,
+            (None, _) => path.map_or_else(|| text.clone(), |path| format!("{path}/{text}")),
             (Some(_), None) => chart.event_text(event),
             (Some(kind), Some(number)) => format!("{kind}#unlisted{}", number + 1),
         }

@@ -129,7 +129,8 @@ impl Functions {
 
 impl Hook for Functions {
     fn event(&mut self, _: &Chart, name: EventName) -> EventId {
-        match self.lua.create_string(name.as_str()) {
+        let text = self.bound.tables().in_lua(name);
+        match self.lua.create_string(text) {
             Ok(text) => self.bound.event(Value::String(text)),
             Err(_) => EventId::OTHER,
         }

@@ -5,6 +5,7 @@ use super::budget::Budget;
 use super::guards::Guards;
 use super::lower::Spot;
 use super::voice::Voice;
+use crate::model::Ident;
 use crate::time::Clock;
 use mlua::chunk::ChunkMode;
 use mlua::{Function, Lua, MultiValue, Result, Table};
@@ -33,6 +34,8 @@ pub struct Host {
     /// The time of inner machines whose model says none.
     pub clock: RefCell<Option<Clock>>,
     pub serial: Cell<u32>,
+    /// The path of the subsystem of the machine that is being made: the coordinator itself, and none that it makes.
+    pub path: Cell<Option<Ident>>,
     /// Functions of the Lua part that the Rust part calls.
     pub native: Table,
 }

@@ -4,8 +4,10 @@ use crate::limits;
 use crate::model::statechart::{
     Action, ChartNode, ChartTransition, Connector, FunctionId, Since, State, Statechart, TimeEvent, Trigger,
 };
+use crate::model::within::Within;
 use crate::model::{Code, ConfigId, EventName, Ident, Origin, codes};
 use mlua::{Function, Result, Table, Value};
+use std::collections::BTreeMap;
 
 /// Where a constructor was called.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -40,6 +42,18 @@ pub struct Lowered {
     /// Events that are no plain texts: value and name, in pairs.
     pub values: Vec<(Value, EventName)>,
     pub problems: Vec<Problem>,
+}
+
+impl Lowered {
+    /// The same, of a coordinator of the subsystem of that path: its events are called as from outside. What they are in Lua stays.
+    pub fn within(mut self, path: Option<Ident>) -> Self {
+        if let Some(path) = path {
+            let within = Within { path, activities: &BTreeMap::new() };
+            within.chart(&mut self.chart);
+            self.values.iter_mut().for_each(|(_, name)| *name = within.event(*name));
+        }
+        self
+    }
 }
 
 /// Gives places: by the number of the spot, the number in the list, and a word.

@@ -34,7 +34,7 @@ pub fn merge(
     row("state", 0, &lua.create_table()?, Some("root"))?;
     row(&what, 1, object, name)?;
     let Lowered { mut chart, functions, values, problems, .. } =
-        lower::lower(&list, native, &mut |_, _, _| Origin::NONE)?;
+        lower::lower(&list, native, &mut |_, _, _| Origin::NONE)?.within(bound.tables().path);
     if !problems.is_empty() {
         let all: Vec<String> = problems.into_iter().map(|problem| problem.message).collect();
         return Ok(Some(all.join("; ")));

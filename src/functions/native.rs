@@ -61,7 +61,7 @@ pub fn install(lua: &Lua, host: &Rc<Host>) -> Result<()> {
         if host.machines.borrow().len() >= limits::INNER_MACHINES {
             return Ok(Some(format!("a coordinator makes at most {} machines", limits::INNER_MACHINES)));
         }
-        match BoundMachine::new(lua, (&host.budget, &host.voice), &host.native, &fsm) {
+        match BoundMachine::new(lua, (&host.budget, &host.voice), &host.native, &fsm, host.path.take()) {
             Ok(bound) => {
                 host.machines.borrow_mut().insert(address(&fsm), Rc::new(bound));
                 Ok(None)

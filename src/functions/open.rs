@@ -159,12 +159,21 @@ pub struct Opener {
     program: Arc<Program>,
     chart: Arc<Statechart>,
     host: Vec<HostFunction>,
+    path: Option<Ident>,
 }
 
 impl Opener {
     /// The functions of `program`, whose chart is `chart`.
     pub fn new(program: Arc<Program>, chart: Arc<Statechart>) -> Self {
-        Self { program, chart, host: Vec::new() }
+        Self { program, chart, host: Vec::new(), path: None }
+    }
+
+    /// Of a coordinator of the subsystem of that path: `chart` has its events as they are called from outside, its functions hear and send
+    /// them as they are called in its file.
+    #[must_use]
+    pub fn within(mut self, path: Option<Ident>) -> Self {
+        self.path = path;
+        self
     }
 
     /// With functions of the program that runs it. They are there once the texts were run: what a text makes must not depend on them.
@@ -197,6 +206,7 @@ impl Opener {
         // What the texts print was told when they were read.
         host.voice.drain(&mut Vec::new());
         let init: Function = host.rfsm(&lua).and_then(|rfsm| rfsm.raw_get("init")).map_err(failed)?;
+        host.path.set(self.path);
         let made: Value = host.budget.spend(limits::LUA_INSTRUCTIONS, || init.call(template)).map_err(failed)?;
         let Value::Table(fsm) = made else {
             let mut said = Vec::new();

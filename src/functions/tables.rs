@@ -2,7 +2,7 @@
 
 use super::lower::{self, Lowered};
 use crate::model::statechart::FunctionId;
-use crate::model::{EventName, Finding, Origin, Severity, Statechart};
+use crate::model::{EventName, Finding, Ident, Origin, Severity, Statechart};
 use crate::statechart::{Chart, EdgeId, EventId, NodeId, NodeKind, compile};
 use mlua::{Function, Lua, Result, Table, Value};
 use rustc_hash::FxHashMap;
@@ -27,6 +27,8 @@ pub struct Tables {
     known: FxHashMap<Box<[u8]>, EventId>,
     /// Values of events that are no texts → number in `listed`, 1-based.
     odd: Table,
+    /// The path of the subsystem whose coordinator it is: in Lua its events are called as in its file.
+    pub path: Option<Ident>,
 }
 
 /// Why a machine could not be made of its tables.
@@ -42,15 +44,20 @@ impl From<mlua::Error> for NotBuilt {
 }
 
 impl Tables {
-    /// Compiles a machine's tables; answers also the chart as written.
-    pub fn new(lua: &Lua, native: &Table, fsm: &Table) -> std::result::Result<(Self, Statechart), NotBuilt> {
+    /// Compiles a machine's tables; answers also the chart as written. `path`: that of the subsystem whose coordinator it is.
+    pub fn new(
+        lua: &Lua,
+        native: &Table,
+        fsm: &Table,
+        path: Option<Ident>,
+    ) -> std::result::Result<(Self, Statechart), NotBuilt> {
         let list = lower::flat(native, fsm)?;
         // A transition is known by its number; nothing else needs a place here.
         let mut places = |_: Option<usize>, number: usize, word: &str| {
             if word.is_empty() { Origin(u32::try_from(number).unwrap_or(0)) } else { Origin::NONE }
         };
         let Lowered { chart: written, functions, transitions, values, problems } =
-            lower::lower(&list, native, &mut places)?;
+            lower::lower(&list, native, &mut places)?.within(path);
         if !problems.is_empty() {
             let findings = problems.into_iter().map(|p| Finding::error(p.code, p.message).help(p.help));
             return Err(NotBuilt::Findings(findings.collect()));
@@ -79,6 +86,7 @@ impl Tables {
             known: FxHashMap::from_iter([((*b"e_init_fsm").into(), chart.init_event())]),
             odd: lua.create_table()?,
             chart,
+            path,
         };
         for node in tables.chart.nodes() {
             let table = match tables.chart.parent(node).map(|parent| &tables.nodes[parent.index()]) {
@@ -95,6 +103,11 @@ impl Tables {
         }
         tables.take_events(lua, &values)?;
         Ok((tables, written))
+    }
+
+    /// What an event is called in Lua.
+    pub fn in_lua(&self, name: EventName) -> &'static str {
+        self.path.and_then(|path| name.local(path)).unwrap_or(name.as_str())
     }
 
     /// The table of a state or connector.
@@ -193,7 +206,7 @@ impl Tables {
             let id = self.chart.event(name);
             let value = match values.iter().find(|(_, n)| *n == name).map(|(value, _)| value.clone()) {
                 Some(value) => value,
-                None => Value::String(lua.create_string(name.as_str())?),
+                None => Value::String(lua.create_string(self.in_lua(name))?),
             };
             match &value {
                 Value::String(text) => {

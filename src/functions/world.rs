@@ -44,6 +44,7 @@ pub fn state(open: Openings, reader: FileReader) -> Result<(Lua, Rc<Host>)> {
         reader: RefCell::new(reader),
         loading: RefCell::default(),
         serial: Cell::new(0),
+        path: Cell::default(),
         native,
     });
     native::install(&lua, &host)?;

@@ -107,7 +107,7 @@ impl Resolve<'_> {
         self.named(text.split_once('/').map_or(text, |(first, _)| first))
     }
 
-    /// Whether a subsystem's platform and activities are those of the deployment, and it has no coordinators with functions.
+    /// Whether a subsystem's platform and activities are those of the deployment.
     fn fits(&self, cx: &mut Cx, own: &Deployment, subsystem: &Subsystem) {
         let name = subsystem.name;
         if (subsystem.own.platform, &subsystem.own.platform_options) != (own.platform, &own.platform_options) {
@@ -126,13 +126,6 @@ impl Resolve<'_> {
                     cx.report(finding.help(help));
                 }
             }
-        }
-        if let Some(coordinator) = subsystem.own.programs.keys().next() {
-            let message = format!("the coordinator `{coordinator}` of `{name}` has functions");
-            let finding = Finding::error(codes::COMPOSE_FUNCTIONS, message).at(subsystem.origin);
-            cx.report(finding.help(
-                "a subsystem's coordinator raises events and has no functions; those of the deployment itself may",
-            ));
         }
     }
 

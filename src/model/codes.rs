@@ -192,9 +192,6 @@ codes! {
     COMPOSE_CIRCLE = "compose::circle", "a deployment is a part of itself",
         "A subsystem's file names, directly or by others, the file that names it. Nothing could ever be built of that. Take one of \
          them out.";
-    COMPOSE_FUNCTIONS = "compose::functions", "the coordinator of a subsystem has functions",
-        "Functions of a trusted coordinator raise and see events by their names in its own file, which are others outside of it. \
-         A subsystem's coordinator is pure; that of the deployment itself may have functions.";
     COMPOSE_WORD = "compose::word", "an event has a name that is told by itself",
         "`up`, `down`, `failed` and `stranded` are told to a parent of each of its subsystems without anybody raising them \
          (`left/up`), and so is what ends in `.ignored`. A deployment cannot emit or accept an event called so. Give it another name.";
@@ -418,9 +415,9 @@ codes! {
     STACK_EMPTY = "stack::empty", "there is nothing to undo",
         "The stack holds no frame that could be popped: nothing was applied, or all of it was undone already, or it was committed. `davit stack` shows the frames.";
     STACK_FLOOR = "stack::floor", "undo does not pass this frame",
-        "The frame contains a step that cannot be undone, or the state was committed after it: it is a floor, and neither it nor a frame below it can be popped. Apply a configuration that leads to the wanted state instead.";
+        "The frame contains a step that cannot be undone, or the state was committed after it: it is a floor, and neither it nor a frame below it can be popped that is of the same file and shares a component with it. Apply a configuration that leads to the wanted state instead.";
     STACK_SHARED = "stack::shared", "a frame above shares something with this one",
-        "A frame below the top can be popped only when nothing above it wrote what it wrote or needs it to be as it is. The finding names the frame above and the thing they share. Undo the frame above first, or undo down to this one (`davit undo --to N`).";
+        "A frame below the top can be popped only when nothing above it wrote what it wrote or needs it to be as it is. What a parent set, wrote or called in a subsystem keeps nothing of that from being undone, only what it has connected. The finding names the frame above and the thing they share. Undo the frame above first, or undo down to this one (`davit undo --to N`).";
     STACK_TAKEN_ALONG = "stack::taken_along", "an operator's frame was undone with a coordinator's",
         "While a deployment is led down, what its coordinator undoes takes along the frames of operators that stand in its way: newest first, in one transaction, both or none. Not what is `safe`, nor what would move when it is undone: then the coordinator's undo is refused, and says so.";
     STACK_GROUP = "stack::group", "the group's present frame cannot be replaced",
@@ -428,9 +425,9 @@ codes! {
     STACK_FOREIGN = "stack::foreign", "the frame belongs to another coordinator",
         "Each coordinator of a deployment undoes its own frames only, whatever the order. Popping the top, or replacing the frame of a group, would here have undone what another coordinator asked for and relies on. Let that coordinator undo it (send it an event), or undo it as an operator.";
     STACK_FULL = "stack::full", "the stack is full and nothing of it can be squashed",
-        "Past its bound the stack squashes its oldest frames into one, but frames of states that are active are never squashed, and here no two others lie side by side. Undo or commit something, or raise `limits: { stack: … }` in the deployment.";
+        "Each coordinator, and operators in each subsystem, may have `limits.stack` frames; past that the oldest are squashed into one, but frames of states that are active are never squashed, and here no two others lie side by side. Undo or commit something, or raise `limits: { stack: … }` in the deployment.";
     STACK_SQUASHED = "stack::squashed", "the frame was squashed together with others",
-        "The stack is bounded: its oldest frames were squashed into one, which can be undone as one only. Undo down to it, or raise `limits: { stack: … }` in the deployment so that more frames stay single.";
+        "The stack is bounded for each coordinator, and for operators in each subsystem: the oldest frames were squashed into one, which can be undone as one only. Undo down to it, or raise `limits: { stack: … }` in the deployment so that more frames stay single.";
     STACK_HELD = "stack::held", "a coordinator's frame is in force",
         "`davit commit` makes the operator's own frames permanent. While a coordinator has a frame in force this is refused: its undo may write over what was made permanent, or need what the operator changed. Commit when the coordinator has undone it, or say `davit commit --force`: the operator's frames are given up and the coordinator's stay, to be undone as far as that goes.";
     STACK_NO_FRAME = "stack::no_frame", "there is no such frame",

@@ -7,7 +7,7 @@ use super::event::{Ask, UNDO, Verdict};
 use super::monitor::{Condition, Monitor, is_monitors};
 use super::names::{ComponentName, EventName, Ident, MemberRef, TypeName};
 use super::state_list::{StateEntry, StateList, Target};
-use super::statechart::{Action, ChartNode, State, Trigger, is_internal};
+use super::statechart::{Action, ChartNode, State, Statechart, Trigger, is_internal};
 use std::collections::BTreeMap;
 
 /// Puts names within a subsystem.
@@ -117,7 +117,7 @@ impl Within<'_> {
         let mut within = of.clone();
         within.name = self.coordinator_name(of);
         within.of = Some(of.of.map_or(self.path, |inner| inner.within(self.path)));
-        self.state(&mut within.chart.root);
+        self.chart(&mut within.chart);
         within
     }
 
@@ -127,6 +127,11 @@ impl Within<'_> {
             CoordinatorNaming::Alone if of.of.is_none() => self.path,
             _ => of.name.within(self.path),
         }
+    }
+
+    /// A chart: the events that it hears and raises, and what it asks for.
+    pub fn chart(&self, chart: &mut Statechart) {
+        self.state(&mut chart.root);
     }
 
     fn state(&self, state: &mut State) {

@@ -7,7 +7,7 @@
 
 use super::leave::along;
 use super::work::{Op, Planned, Room, Work};
-use super::{FrameId, LedDown, Reason, Request, Requester, Residual, Why, World, claims, may_commit, share};
+use super::{FrameId, LedDown, Pile, Reason, Request, Requester, Residual, Why, World, claims, may_commit, share};
 
 use crate::model::{Ask, ComponentName, ConfigId, Configuration, Finding, OnFailure, Step, Verdict, codes};
 use crate::plan::replace::neighbours;
@@ -31,8 +31,8 @@ pub struct Rules<'a> {
     pub at: Time,
     /// Frames that others under way pop or hand over to, and those that wait for their confirmation.
     pub held: &'a [FrameId],
-    /// Who asked for the pushes under way beside it: these have taken their places on the stack ([`places`]).
-    pub places: &'a [Requester],
+    /// Of which piles the pushes under way beside it are: these have taken their places on the stack ([`places`]).
+    pub places: &'a [Pile],
     /// Undos and pushes of the batch were begun together, though not all of them may be left: some were answered since.
     pub joined: bool,
     /// Its pushes have taken their place on the stack when they began: what others hold on to since does not matter.

@@ -3,12 +3,13 @@
 //! It is planned whole where that goes; else piece by piece, each piece by itself. What concerns a component that is not
 //! there has nothing to be made safe, and is left out.
 
+use super::void::rest;
 use super::work::{Op, Part, Planned, transaction};
 use super::{Edits, Frame, FrameId, Inverse, Reason, Request, Stack};
 use crate::model::{Change, Configuration, StateList, Step, codes};
 use crate::plan::footprint::Footprint;
-use crate::plan::undo::{absolute, items};
-use crate::plan::{PlanContext, PlannedStep, SavedValue, plan_on};
+use crate::plan::undo::items;
+use crate::plan::{PlanContext, PlannedStep, plan_on};
 use crate::system::{Overlay, System};
 use crate::time::Time;
 use rustc_hash::FxHashSet;
@@ -46,20 +47,7 @@ pub fn effort(
 
 /// The frame of a safe configuration of which these steps were not done: it takes back what was.
 pub fn without(frame: Frame, missed: &[Step]) -> Frame {
-    let (mut done, mut gone, mut before) = (Vec::new(), Vec::new(), Vec::new());
-    for planned in frame.steps() {
-        before.push(done.len());
-        match missed.contains(&planned.step) {
-            true => gone.extend(absolute(&planned.step)),
-            false => done.push(planned.clone()),
-        }
-    }
-    // What was overwritten stands at the places of steps.
-    let place = |at: u32| before.get(at as usize).map_or(done.len(), |at| *at);
-    let saved = frame.saved.iter().filter(|saved| !gone.contains(&saved.slot));
-    let saved: Vec<SavedValue> = saved
-        .map(|saved| SavedValue { at: u32::try_from(place(saved.at)).unwrap_or(u32::MAX), ..saved.clone() })
-        .collect();
+    let (done, saved) = rest(&frame, &|planned| !missed.contains(&planned.step));
     Frame { inverse: Inverse::List(items(&done, &saved)), saved, partial: true, ..frame }
 }
 

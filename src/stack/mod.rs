@@ -19,6 +19,7 @@ mod leave;
 mod mend;
 mod net;
 mod permanent;
+mod pile;
 mod prepared;
 pub mod request;
 mod settle;
@@ -27,6 +28,7 @@ mod squash;
 mod stands;
 #[cfg(test)]
 mod tests;
+mod void;
 mod work;
 mod world;
 
@@ -36,6 +38,7 @@ pub use desk::{ActiveBatch, Arrival, Arrived, Desk, GivenUp, Gone, given_up_of};
 pub use effort::{BestEffort, effort};
 pub use net::reduce;
 pub use permanent::may_commit;
+pub use pile::Pile;
 pub use prepared::{ResolvedStep, Switch};
 pub use request::{Batch, FrameId, LedDown, Request, Requester, Scope, Why};
 pub use settle::{About, Ending, Endings, SafeEnd, Settled, Stopped, settle};
@@ -169,6 +172,8 @@ pub struct Stack {
 pub struct Edits {
     /// Frames that go.
     pub pops: Vec<(FrameId, HandOver)>,
+    /// Components that their own file takes away: what frames of others did to them is void.
+    pub gone: Vec<ComponentName>,
     /// A frame that comes; its number is given when it does.
     pub push: Option<Arc<Frame>>,
     /// That frame waits for its confirmation: until then it is not squashed, since it may have to be taken back alone.
@@ -176,7 +181,7 @@ pub struct Edits {
 }
 
 impl Stack {
-    /// An empty stack that squashes past `bound` frames of one requester (at least 2).
+    /// An empty stack that squashes past `bound` frames of one pile (at least 2).
     pub fn new(bound: usize) -> Self {
         Self {
             frames: Vec::with_capacity(bound.clamp(2, 4096) + 1),
@@ -185,6 +190,12 @@ impl Stack {
             next: 1,
             memory: None,
         }
+    }
+
+    /// The same, with memory for so many piles that are full.
+    pub fn for_piles(mut self, piles: usize) -> Self {
+        self.frames.reserve_exact(self.bound.saturating_mul(piles).min(4096));
+        self
     }
 
     /// The same, and of the same frames it is squashed once, in it and all its copies: for whoever follows thousands of them.
@@ -261,18 +272,31 @@ impl Stack {
         self.committed.clear();
     }
 
-    /// The same of a subsystem of which nothing is left: its coordinators' frames, and those of others that touch nothing else.
-    pub fn discard_in(&mut self, path: Ident) {
+    /// The same of a subsystem of which nothing is left: its coordinators' frames, and of those of others what they did to it. `busy`: see
+    /// [`Self::apply`].
+    pub fn discard_in(&mut self, path: Ident, busy: &[FrameId]) {
         let asks = |by: Requester| match by {
             Requester::Coordinator(name) => name.as_str() == path.as_str() || name.local(path).is_some(),
             Requester::Operator | Requester::Safety => false,
         };
         self.frames.retain(|frame| {
-            let touched = share::components(&frame.footprint);
-            let inside = !touched.is_empty() && touched.iter().all(|component| component.local(path).is_some());
-            !(asks(frame.requester) && frame.parts.iter().all(|part| asks(part.requester)) || inside)
+            let empty = frame.footprint.touches.is_empty() && frame.configuration.local(path).is_some();
+            !(asks(frame.requester) && frame.parts.iter().all(|part| asks(part.requester)) || empty)
         });
-        self.committed.retain(|buried| !asks(buried.requester));
+        self.committed.retain(|buried| !asks(buried.requester) && buried.configuration.local(path).is_none());
+        self.take_out(&|_, of| of.local(path).is_some(), busy);
+    }
+
+    /// Takes out of the frames what they did to components that are gone.
+    fn take_out(&mut self, gone: &dyn Fn(&Frame, ComponentName) -> bool, busy: &[FrameId]) {
+        if void::take_out(&mut self.frames, gone) {
+            // Some are about less than before, and count elsewhere.
+            let mut piles: SmallVec<[Pile; 4]> = self.frames.iter().map(|frame| frame.pile()).collect();
+            while let Some(pile) = piles.pop() {
+                piles.retain(|other| *other != pile);
+                squash::fit(&mut self.frames, pile, self.bound, busy, self.memory.as_ref());
+            }
+        }
     }
 
     /// Takes over what the parts of a transaction do to the stack, in their order, now that their steps are done. Answers
@@ -291,7 +315,7 @@ impl Stack {
         let mut pushed: Vec<Option<FrameId>> = Vec::new();
         let mut numbers: Vec<(FrameId, FrameId)> = Vec::new();
         let mut busy = SmallVec::<[FrameId; 4]>::from_slice(busy);
-        for Edits { pops, push, waits } in edits {
+        for Edits { pops, gone, push, waits } in edits {
             for (id, hand) in pops {
                 let real =
                     |id: FrameId| numbers.iter().rev().find(|(given, _)| *given == id).map_or(id, |(_, real)| *real);
@@ -299,6 +323,9 @@ impl Stack {
                 share::hand_over(&mut self.frames, hand, &real);
                 self.frames.retain(|frame| frame.id != popped);
                 pushed.iter_mut().filter(|id| **id == Some(popped)).for_each(|id| *id = None);
+            }
+            if !gone.is_empty() {
+                self.take_out(&|frame, of| gone.contains(&of) && void::is_foreign(frame, of), &busy);
             }
             if push.is_none() {
                 pushed.push(None);
@@ -310,13 +337,13 @@ impl Stack {
                 pushed.push(Some(id));
                 let mut frame = frame.clone();
                 Arc::make_mut(&mut frame).id = id;
-                let requester = frame.requester;
+                let pile = frame.pile();
                 // Of those who follow thousands of stacks each has only what it needs.
                 self.frames.reserve_exact(1);
                 self.frames.push(frame);
                 busy.extend(waits.then_some(id));
                 // Room was made sure of when it began; where others hold on to frames since, there is one more for a while.
-                squash::fit(&mut self.frames, requester, self.bound, &busy, self.memory.as_ref());
+                squash::fit(&mut self.frames, pile, self.bound, &busy, self.memory.as_ref());
             }
         }
         pushed

@@ -1,7 +1,8 @@
 //! What is made permanent (semantics: *The stack*): frames that are given up, so that what they did stays.
 
-use super::{Frame, Requester, Stack};
+use super::{Frame, Requester, Stack, share};
 use crate::model::{Finding, codes};
+use std::sync::Arc;
 
 /// Whether `by` may make its frames permanent: what a coordinator has in force may lie on them, or they on it, and its
 /// undo would then write over what was to stay. `force` accepts that.
@@ -31,9 +32,10 @@ impl Stack {
     /// Gives up the frames of `by`: what they did can no longer be undone. Those of others stay, and so does a floor that
     /// holds back one of them; it cannot be undone anyway.
     pub fn make_permanent(&mut self, by: Requester) {
-        let mut kept = Vec::with_capacity(self.frames.capacity());
+        let mut kept: Vec<Arc<Frame>> = Vec::with_capacity(self.frames.capacity());
         for frame in self.frames.drain(..) {
-            if !frame.is_own(by) || (frame.floor.is_some() && !kept.is_empty()) {
+            let holds_back = || frame.floor.is_some() && kept.iter().any(|below| share::holds_back(&frame, below));
+            if !frame.is_own(by) || holds_back() {
                 kept.push(frame);
                 continue;
             }

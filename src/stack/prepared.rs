@@ -185,11 +185,13 @@ impl Switch {
 }
 
 impl Stack {
-    /// Whether a switch can be pushed as it is: no frame of its group must be replaced, and none be squashed for it.
+    /// Whether a switch can be pushed as it is, for who asks: no frame of its group must be replaced, none be squashed for it, and there is
+    /// memory for it.
     /// Otherwise its configuration is pushed by an ordinary transaction.
-    pub fn takes(&self, switch: &Switch) -> bool {
+    pub fn takes(&self, switch: &Switch, by: Requester) -> bool {
         let group = switch.frame.group;
-        self.frames.len() < self.bound
+        self.frames.len() < self.frames.capacity()
+            && self.has_room(by, 1)
             && (group.is_none()
                 || self.frames.iter().all(|f| f.group != group && f.parts.iter().all(|p| p.group != group)))
     }

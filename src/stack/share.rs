@@ -2,6 +2,7 @@
 //!
 //! What a safe configuration has called stays while it is in force, whoever else called the same: nothing takes it back.
 
+use super::void::Connections;
 use super::{Frame, FrameId, Inverse};
 use crate::model::{Call, ChangeKind, ComponentName, Configuration, Finding, MemberRef, Step, codes};
 use crate::plan::SavedValue;
@@ -120,6 +121,16 @@ pub(super) fn called_again<'f>(by: &'f Configuration, frame: &'f Frame) -> impl 
     calls(frame).filter(move |operation| by.safe && calls_too(operation)).map(Slot::Operation)
 }
 
+/// Whether a floor may hold back a frame: one of its own file; what is safe is for all.
+fn reaches(floor: &Frame, frame: &Frame) -> bool {
+    floor.safe || floor.is_of_a_file_of(frame)
+}
+
+/// Whether a floor holds back a frame below it, which shares a component with it.
+pub(super) fn holds_back(floor: &Frame, frame: &Frame) -> bool {
+    reaches(floor, frame) && meet(&components(&frame.footprint), &floor.footprint)
+}
+
 /// Whether the frame at `at` may be popped.
 pub(super) fn examine(frames: &[Arc<Frame>], at: usize) -> Result<HandOver, Box<Finding>> {
     look(frames, at).map_err(|hindrance| Box::new(hindrance.finding))
@@ -139,9 +150,9 @@ pub(super) fn look(frames: &[Arc<Frame>], at: usize) -> Result<HandOver, Box<Hin
     if frames[at..].iter().any(|above| above.floor.is_some()) {
         let mine = components(&frame.footprint);
         for (place, above) in frames[at..].iter().enumerate() {
-            // A floor holds back what shares a component with it, and itself.
+            // Itself as well.
             if let Some(reason) = &above.floor
-                && (place == 0 || meet(&mine, &above.footprint))
+                && (place == 0 || reaches(above, frame) && meet(&mine, &above.footprint))
             {
                 let message = format!("`{}` cannot be undone: {reason}", frame.configuration);
                 let finding = Finding::error(codes::STACK_FLOOR, message)
@@ -169,8 +180,11 @@ pub(super) fn look(frames: &[Arc<Frame>], at: usize) -> Result<HandOver, Box<Hin
     let keep =
         |touch: &Touch| touch.serves.is_none_or(|slot| !hand.slots.contains(&slot)) && !untouched.contains(&touch.slot);
     let index = Index::new(&frame.footprint, keep);
+    let mut connections = Connections::default();
     for other in above.iter().rev() {
-        if let Some(touch) = other.footprint.touches.iter().find(|touch| index.shares(touch)) {
+        let mut touches = other.footprint.touches.iter();
+        let shared = touches.find(|touch| index.shares(touch) && !connections.pass(frame, other, touch));
+        if let Some(touch) = shared {
             let did = match touch.access {
                 Access::Need => "needs",
                 Access::Join | Access::Write => "changes",

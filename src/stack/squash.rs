@@ -1,7 +1,7 @@
-//! Keeping each requester within its bound: its oldest frames become one, which is undone as one (semantics: *The stack*).
+//! Keeping each pile of frames within its bound: its oldest become one, which is undone as one (semantics: *The stack*).
 
 use super::net::reduce;
-use super::{Frame, FrameId, Inverse, Requester, share};
+use super::{Frame, FrameId, Inverse, Pile, share};
 use crate::limits;
 use crate::model::{MemberRef, Step};
 use crate::plan::footprint::{Footprint, Slot, Touch};
@@ -41,36 +41,30 @@ impl Memory {
     }
 }
 
-/// Whether `requester` can be brought to at most `bound` frames.
-pub(super) fn fits(
-    frames: &[Arc<Frame>],
-    requester: Requester,
-    bound: usize,
-    busy: &[FrameId],
-    memory: Option<&Memory>,
-) -> bool {
-    let own = frames.iter().filter(|frame| frame.requester == requester).count();
+/// Whether a pile can be brought to at most `bound` frames.
+pub(super) fn fits(frames: &[Arc<Frame>], pile: Pile, bound: usize, busy: &[FrameId], memory: Option<&Memory>) -> bool {
+    let own = frames.iter().filter(|frame| pile.has(frame)).count();
     // What the last two of them become is nobody's to know yet.
     match own.checked_sub(bound + 1) {
         None => true,
-        Some(0) => pair(frames, requester, busy).is_some(),
+        Some(0) => pair(frames, pile, busy).is_some(),
         Some(_) => {
             let mut frames = frames.to_vec();
-            fit(&mut frames, requester, bound + 1, busy, memory) && pair(&frames, requester, busy).is_some()
+            fit(&mut frames, pile, bound + 1, busy, memory) && pair(&frames, pile, busy).is_some()
         }
     }
 }
 
-/// Squashes until `requester` has at most `bound` frames; `busy` ones stay as they are. False: no two could be squashed.
+/// Squashes until a pile has at most `bound` frames; `busy` ones stay as they are. False: no two could be squashed.
 pub(super) fn fit(
     frames: &mut Vec<Arc<Frame>>,
-    requester: Requester,
+    pile: Pile,
     bound: usize,
     busy: &[FrameId],
     memory: Option<&Memory>,
 ) -> bool {
-    while frames.iter().filter(|f| f.requester == requester).count() > bound {
-        let Some((lower, upper)) = pair(frames, requester, busy) else { return false };
+    while frames.iter().filter(|frame| pile.has(frame)).count() > bound {
+        let Some((lower, upper)) = pair(frames, pile, busy) else { return false };
         let upper = frames.remove(upper);
         frames[lower] = match memory {
             Some(memory) => memory.squash(&frames[lower], &upper),
@@ -82,10 +76,10 @@ pub(super) fn fit(
 
 /// The places of the two that are squashed next: the oldest, but such that as much as possible stays possible. The upper
 /// one moves down to the lower, so nothing between may share with it.
-fn pair(frames: &[Arc<Frame>], requester: Requester, busy: &[FrameId]) -> Option<(usize, usize)> {
+fn pair(frames: &[Arc<Frame>], pile: Pile, busy: &[FrameId]) -> Option<(usize, usize)> {
     // A partial frame is undone by its name.
     let free = |f: &Frame| f.scope.is_none() && !f.partial && !busy.contains(&f.id);
-    let own: Vec<usize> = (0..frames.len()).filter(|at| frames[*at].requester == requester).collect();
+    let own: Vec<usize> = (0..frames.len()).filter(|at| pile.has(&frames[*at])).collect();
     let newest = own.last().copied();
     let clear = |lower: usize, upper: usize| {
         frames[lower + 1..upper].iter().all(|between| !share::shares(&frames[upper], between))

@@ -8,6 +8,8 @@ use crate::time::Time;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+mod void;
+
 fn ident(name: &str) -> Ident {
     Ident::new(name).unwrap()
 }

@@ -1,9 +1,11 @@
 //! Operations on the stack become one plan: every step decided, and how the stack changes with each part of it.
 
 use super::share::{self, HandOver};
-use super::{Edits, Frame, FrameId, Inverse, Requester, Scope, Stack, net, newest, squash};
+use super::{Edits, Frame, FrameId, Inverse, Pile, Requester, Scope, Stack, net, newest, squash, void};
 use crate::model::finding::count;
-use crate::model::{ConfigId, Configuration, Finding, Findings, MemberRef, OnFailure, Tunable, codes};
+use crate::model::{
+    ComponentName, ConfigId, Configuration, Finding, Findings, MemberRef, OnFailure, Step, Tunable, codes,
+};
 use crate::plan::undo::{DraftStep, Script, undo};
 use crate::plan::{Plan, PlanContext, PlannedStep, Refusal, StepId, plan_on};
 use crate::system::{Overlay, System, View, Violation};
@@ -134,16 +136,16 @@ pub fn transaction(system: &System, stack: &Stack, ops: &[Op<'_>], context: &Pla
 pub(super) struct Room<'a> {
     /// Frames that are not squashed.
     pub held: &'a [FrameId],
-    /// Who asked for the pushes under way: so many more frames there will be of each.
-    pub places: &'a [Requester],
+    /// Of which piles the pushes under way are: so many more frames there will be of each.
+    pub places: &'a [Pile],
 }
 
-/// Who asks for the frames that a plan under way pushes, without those whose place another one of its requester leaves.
-pub fn places(planned: &Planned) -> SmallVec<[Requester; 2]> {
+/// Of which piles the frames are that a plan under way pushes, without those whose place another one of theirs leaves.
+pub fn places(planned: &Planned) -> SmallVec<[Pile; 2]> {
     let pushes = planned.parts.iter().filter_map(|part| part.edits.push.as_ref());
-    let mut places: SmallVec<[Requester; 2]> = pushes.map(|frame| frame.requester).collect();
+    let mut places: SmallVec<[Pile; 2]> = pushes.map(|frame| frame.pile()).collect();
     for popped in &planned.popped {
-        if let Some(at) = places.iter().position(|by| *by == popped.requester) {
+        if let Some(at) = places.iter().position(|pile| pile.has(popped)) {
             places.remove(at);
         }
     }
@@ -279,6 +281,11 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
         taken_back.map_err(|found| drifted(&found))?;
         share::hand_over(&mut self.frames, &hand, &|id| id);
         self.frames.remove(at);
+        // What it had made is away, also where what was there before is back; of what is left of one that is not known.
+        let view = self.script.view();
+        let away = |of: &ComponentName| !frame.partial || view.component(*of).is_none();
+        let gone: Vec<ComponentName> = void::made_by(&frame).filter(away).collect();
+        self.is_taken_away(gone.into_iter(), edits);
         // A frame that this very transaction pushes and pops leaves no trace.
         if let Some(i) = self.pushed.iter().position(|id| *id == frame.id) {
             self.pushed.remove(i);
@@ -287,6 +294,17 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
         }
         edits.pops.push((frame.id, hand));
         Ok(())
+    }
+
+    /// Their own file takes components away: what frames of others did to them is void from now on.
+    fn is_taken_away(&mut self, gone: impl Iterator<Item = ComponentName>, edits: &mut Edits) {
+        let matters = |of: &ComponentName| self.frames.iter().any(|frame| void::is_foreign(frame, *of));
+        let mut gone: Vec<ComponentName> = gone.filter(matters).collect();
+        if !gone.is_empty() {
+            gone.sort_unstable();
+            void::take_out(&mut self.frames, &|frame, of| gone.contains(&of) && void::is_foreign(frame, of));
+            edits.gone.extend(gone);
+        }
     }
 
     fn take_back(&mut self, frame: &Frame, hand: &HandOver) -> Result<(), Vec<Violation>> {
@@ -327,6 +345,11 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
         let Plan { configuration: id, group, steps, footprint, saved, warnings, .. } = plan;
         let floor = crate::plan::irreversible(&steps).map(str::to_owned);
         self.warnings.extend(warnings);
+        let destroyed = steps.iter().filter_map(|planned| match planned.step {
+            Step::Destroy { component } => Some(component),
+            _ => None,
+        });
+        self.is_taken_away(destroyed, edits);
         let steps = Arc::new(steps);
         if self.parts.is_empty() && !self.replaced && self.script.steps.is_empty() {
             self.lone = Some(steps.clone());
@@ -409,12 +432,12 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
         let busy: Vec<FrameId> = held.chain(waiting.map(|frame| frame.id)).collect();
         for (id, room) in pushed.iter().flat_map(|id| room.map(|room| (id, room))) {
             let Some(frame) = frames.iter().find(|frame| frame.id == *id) else { continue };
-            let taken = room.places.iter().filter(|by| **by == frame.requester).count();
-            let own = taken + frames.iter().filter(|f| f.requester == frame.requester).count();
+            let pile = frame.pile();
+            let taken = room.places.iter().filter(|of| **of == pile).count();
+            let own = taken + frames.iter().filter(|frame| pile.has(frame)).count();
             let bound = stack.bound.saturating_sub(taken);
-            if own > stack.bound && !squash::fits(&frames, frame.requester, bound, &busy, stack.memory.as_ref()) {
-                let message =
-                    format!("`{}` would have {}, and none can be squashed", frame.requester, count(own, "frame"));
+            if own > stack.bound && !squash::fits(&frames, pile, bound, &busy, stack.memory.as_ref()) {
+                let message = format!("{pile} would have {}, and none can be squashed", count(own, "frame"));
                 let finding = Finding::error(codes::STACK_FULL, message)
                     .help("undo or commit something, or raise `limits: { stack: … }` in the deployment");
                 return Err(Refusal { findings: vec![finding], request: parts.len().saturating_sub(1) });

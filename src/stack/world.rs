@@ -133,14 +133,15 @@ impl World {
         }
     }
 
-    /// All coordinators of a subsystem are down. True: nothing of it is there any more, and what was in force of it is not.
-    pub fn settle_down_in(&mut self, path: Ident) -> bool {
+    /// All coordinators of a subsystem are down. True: nothing of it is there any more, and what was in force of it is not. `busy`: see
+    /// [`Stack::apply`].
+    pub fn settle_down_in(&mut self, path: Ident, busy: &[FrameId]) -> bool {
         let mut inside = false;
         self.system.for_each_component(&mut |node| inside |= node.name.local(path).is_some());
         let over =
             !inside && !self.broken.iter().any(|broken| broken.components.iter().any(|c| c.local(path).is_some()));
         if over {
-            self.stack.discard_in(path);
+            self.stack.discard_in(path, busy);
         }
         over
     }

@@ -107,7 +107,7 @@ fn a_prepared_switch_allocates_nothing() {
     stack.commit(undo);
     assert_eq!(system.snapshot(), before);
     let cycle = |switch: &mut Switch, system: &mut System, stack: &mut Stack| {
-        assert!(stack.takes(switch));
+        assert!(stack.takes(switch, requester));
         assert!(switch.ready(system, requester, at, scope));
         assert_eq!(perform(switch, false, system), 4);
         stack.push_switch(switch);

@@ -30,7 +30,7 @@ const COORDINATOR: &str = r#"return state {
 }
 "#;
 
-fn cell() -> Demo {
+pub fn cell() -> Demo {
     let demo = Demo::new();
     for file in ["pair.yaml", "robot.yaml"] {
         demo.write(file, &example(file));
@@ -46,7 +46,7 @@ fn cell() -> Demo {
     demo
 }
 
-fn example(file: &str) -> String {
+pub fn example(file: &str) -> String {
     let path = format!("{}/examples/pair/{file}", env!("CARGO_MANIFEST_DIR"));
     std::fs::read_to_string(path).expect("an example")
 }
@@ -458,25 +458,8 @@ fn what_an_operator_put_on_a_subsystem_goes_when_that_is_led_down_alone() {
     assert_eq!(ran.code, 0, "{}{}", ran.out, ran.err);
 }
 
-/// A sibling that is busy does not keep a subsystem from being down, nor from telling it.
-#[test]
-fn that_a_subsystem_is_down_is_told_while_a_sibling_is_busy() {
-    let demo = cell();
-    demo.write(
-        "robot.yaml",
-        &example("robot.yaml").replace(
-            "    properties: { gain: { type: float, default: 1.0 } }",
-            "    properties: { gain: { type: float, default: 1.0 } }\n    operations: { home: { effect: none } }",
-        ),
-    );
-    demo.write(
-        "robot_configurations.lua",
-        &example("robot_configurations.lua").replacen(
-            "ConfiguratorConf {",
-            "ConfiguratorConf { home = Configuration { timeout = 9, operation_call('Drive.home') },",
-            1,
-        ),
-    );
+/// Leads each of the pair by a coordinator of its own.
+pub fn apart(demo: &Demo) {
     demo.write(
         "pair.yaml",
         &example("pair.yaml")
@@ -496,6 +479,28 @@ fn that_a_subsystem_is_down_is_told_while_a_sibling_is_busy() {
                 .replace("SIDE", side),
         );
     }
+}
+
+/// A sibling that is busy does not keep a subsystem from being down, nor from telling it.
+#[test]
+fn that_a_subsystem_is_down_is_told_while_a_sibling_is_busy() {
+    let demo = cell();
+    demo.write(
+        "robot.yaml",
+        &example("robot.yaml").replace(
+            "    properties: { gain: { type: float, default: 1.0 } }",
+            "    properties: { gain: { type: float, default: 1.0 } }\n    operations: { home: { effect: none } }",
+        ),
+    );
+    demo.write(
+        "robot_configurations.lua",
+        &example("robot_configurations.lua").replacen(
+            "ConfiguratorConf {",
+            "ConfiguratorConf { home = Configuration { timeout = 9, operation_call('Drive.home') },",
+            1,
+        ),
+    );
+    apart(&demo);
     demo.write(
         "story.lua",
         "deploy('pair.yaml')

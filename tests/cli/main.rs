@@ -2,6 +2,7 @@
 
 mod agree;
 mod answered;
+mod apart;
 mod background;
 mod booked;
 mod breakages;

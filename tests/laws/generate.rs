@@ -46,10 +46,17 @@ pub fn configs(n: std::ops::Range<usize>) -> impl Strategy<Value = Vec<ConfigGen
     vec(config(), n)
 }
 
-const NAMES: [&str; 8] = ["a", "b", "c", "d", "e", "s/f", "s/g", "t/h"];
+const NAMES: [&str; 11] = ["a", "b", "c", "d", "e", "f", "g", "h", "s/f", "s/g", "t/h"];
 
 pub fn name(n: u8) -> ComponentName {
     ComponentName::new(NAMES[n as usize % NAMES.len()]).unwrap()
+}
+
+/// A name of the file of that path.
+fn name_in(path: &str, n: u8) -> ComponentName {
+    let all: Vec<ComponentName> = NAMES.iter().map(|text| ComponentName::new(text).unwrap()).collect();
+    let own: Vec<ComponentName> = all.into_iter().filter(|name| name.prefix() == path).collect();
+    own[n as usize % own.len()]
 }
 
 fn type_name(n: usize) -> TypeName {
@@ -158,6 +165,8 @@ pub fn context() -> PlanContext {
 
 /// Reads a gene against a system.
 struct Reader<'s> {
+    /// The path of its file; none: it is about all there is.
+    path: Option<&'static str>,
     system: &'s System,
     conf: Configuration,
     /// Components as they will be while the changes are made: existing or created ones, with their type.
@@ -170,22 +179,56 @@ fn pick<T: Clone>(from: &[T], n: u8) -> Option<T> {
     (!from.is_empty()).then(|| from[n as usize % from.len()].clone())
 }
 
-/// The configuration that `gene` stands for in `system`.
+/// The configuration that `gene` stands for in `system`: of the deployment's file or, one of eight, of a subsystem's. It is about components of
+/// its own file; what a file does to those of another one is what `piles` is about.
 pub fn read(gene: &ConfigGene, system: &System) -> Configuration {
-    let id = [format!("k{}", gene.id % 4), format!("s/k{}", gene.id % 4)][usize::from(gene.id % 8 == 7)].clone();
-    let mut conf = Configuration::new(ConfigId::new(&id).unwrap());
-    conf.group = [None, None, Some(ident("g")), Some(ident("h"))][gene.group as usize % 4];
-    let mut there = BTreeMap::new();
-    system.for_each_component(&mut |n| _ = there.insert(n.name, n.ty.clone()));
-    let mut driven = BTreeSet::new();
-    system.for_each_link(&mut |_, to, _| _ = driven.insert(to));
-    let mut r = Reader { system, conf, there, gone: BTreeSet::new(), driven };
-    r.list(&gene.pre, true);
-    for change in &gene.changes {
-        r.change(*change);
+    let path = match gene.id / 4 % 16 {
+        14 => "s",
+        15 => "t",
+        _ => "",
+    };
+    let id = if path.is_empty() { format!("k{}", gene.id % 4) } else { format!("{path}/k{}", gene.id % 4) };
+    Reader::new(gene, system, &id, Some(path)).read(gene)
+}
+
+/// The same, about whatever there is.
+pub fn read_all(gene: &ConfigGene, system: &System) -> Configuration {
+    Reader::new(gene, system, "k", None).read(gene)
+}
+
+impl<'s> Reader<'s> {
+    fn new(gene: &ConfigGene, system: &'s System, id: &str, path: Option<&'static str>) -> Self {
+        let mut conf = Configuration::new(ConfigId::new(id).unwrap());
+        conf.group = [None, None, Some(ident("g")), Some(ident("h"))][gene.group as usize % 4];
+        let mut there = BTreeMap::new();
+        let own = |name: ComponentName| path.is_none_or(|path| name.prefix() == path);
+        system.for_each_component(&mut |n| drop(own(n.name).then(|| there.insert(n.name, n.ty.clone()))));
+        let mut driven = BTreeSet::new();
+        system.for_each_link(&mut |_, to, _| _ = driven.insert(to));
+        Self { path, system, conf, there, gone: BTreeSet::new(), driven }
     }
-    r.list(&gene.post, false);
-    r.conf
+
+    fn read(self, gene: &ConfigGene) -> Configuration {
+        let mut r = self;
+        r.list(&gene.pre, true);
+        for change in &gene.changes {
+            r.change(*change);
+        }
+        r.list(&gene.post, false);
+        r.conf
+    }
+
+    fn is_own(&self, name: ComponentName) -> bool {
+        self.path.is_none_or(|path| name.prefix() == path)
+    }
+
+    /// The components of its file.
+    fn there_is(&self) -> Vec<ComponentName> {
+        let mut names = Vec::new();
+        self.system.for_each_component(&mut |n| names.push(n.name));
+        names.retain(|name| self.is_own(*name));
+        names
+    }
 }
 
 const STATES: [Wanted; 4] = [Wanted::Running, Wanted::Stopped, Wanted::Running, Wanted::Unconfigured];
@@ -199,16 +242,11 @@ impl Reader<'_> {
                 default = true;
                 Target::Default
             } else {
-                let names: Vec<ComponentName> = if pre {
-                    let mut names = Vec::new();
-                    self.system.for_each_component(&mut |n| names.push(n.name));
-                    names
-                } else {
-                    self.there.keys().copied().collect()
-                };
+                let names: Vec<ComponentName> =
+                    if pre { self.there_is() } else { self.there.keys().copied().collect() };
                 match pick(&names, *who) {
                     Some(name) if who % 32 != 31 => Target::Component(name),
-                    _ if who % 4 == 3 => Target::Component(name(*who)),
+                    _ if who % 4 == 3 => Target::Component(name_in(self.path.unwrap_or_default(), *who)),
                     _ => continue,
                 }
             };
@@ -230,11 +268,12 @@ impl Reader<'_> {
 
     fn change(&mut self, [kind, a, b, c]: [u8; 4]) {
         match kind % 18 {
-            0..=3 => self.create(name(a), b, c),
+            0..=3 => self.create(name_in(self.path.unwrap_or_default(), a), b, c),
             4..=7 => self.connect(a, b, c),
             8 => {
                 let mut links = Vec::new();
                 self.system.for_each_link(&mut |from, to, _| links.push((from, to)));
+                links.retain(|(from, to)| self.is_own(from.component) && self.is_own(to.component));
                 if let Some((from, to)) = pick(&links, a) {
                     self.push(ChangeKind::Disconnect { from, to });
                     self.driven.remove(&to);
@@ -272,7 +311,7 @@ impl Reader<'_> {
     fn replace(&mut self, a: u8, b: u8, c: u8) {
         let mut old = Vec::new();
         self.system.for_each_component(&mut |n| old.push((n.name, n.ty.clone())));
-        old.retain(|(name, _)| c % 32 == 31 || !self.gone.contains(name));
+        old.retain(|(name, _)| self.is_own(*name) && (c % 32 == 31 || !self.gone.contains(name)));
         let Some((component, old)) = pick(&old, a) else { return };
         let (ty, declared, properties) = self.made(b, c);
         let mut map = BTreeMap::new();
@@ -339,8 +378,7 @@ impl Reader<'_> {
     }
 
     fn destroy(&mut self, a: u8, b: u8) -> Option<ComponentName> {
-        let mut names = Vec::new();
-        self.system.for_each_component(&mut |n| names.push(n.name));
+        let mut names = self.there_is();
         names.retain(|n| !self.gone.contains(n));
         let component = pick(&names, a)?;
         let mut links = Vec::new();

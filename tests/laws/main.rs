@@ -13,6 +13,7 @@ mod machine;
 mod motion;
 #[path = "../support/names.rs"]
 mod names;
+mod piles;
 mod plain;
 mod plans;
 mod prepared;

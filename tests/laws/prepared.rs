@@ -68,7 +68,8 @@ impl Twins {
         let planned = self.plain.ask(&[op(&conf, at)]);
         let Both { system, stack, .. } = &self.fast;
         let (requester, time, scope) = asked(at);
-        let ready = |switch: &mut Switch| stack.takes(switch) && switch.ready(system, requester, time, scope);
+        let ready =
+            |switch: &mut Switch| stack.takes(switch, requester) && switch.ready(system, requester, time, scope);
         let place = self.kept[which].iter_mut().position(ready);
         if self.last == Some((which, true)) {
             prop_assert!(place.is_some(), "nothing has changed since it was undone");

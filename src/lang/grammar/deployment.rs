@@ -368,7 +368,8 @@ pub static LIMITS: Object = Object {
         key(
             "stack",
             Form::Whole { least: FEWEST_FRAMES, most: MOST_FRAMES },
-            "How many frames the stack has before its oldest are squashed into one.",
+            "How many frames there may be of each coordinator, and of operators in each subsystem, before the oldest of them are squashed into one; that of \
+             the deployment that runs counts for all its subsystems.",
             "stack: 64",
             ("stack: 1", TEXT_BAD_VALUE),
         )
