@@ -130,6 +130,8 @@ fn follow(
 ) -> (Explored, Option<Arc<InterfaceAutomaton>>) {
     let Followed { deployment, views, charts, catalogue, effort, around } = *those;
     let mut shows = None;
+    // What functions raise is not known.
+    let pure = charts.iter().all(|chart| chart.is_pure());
     let mut explored = Explored { complete: true, without_failure: true, ..Explored::default() };
     let all: Vec<usize> = (0..charts.len()).collect();
     let mut product = Product::new(deployment, views, charts, &all, catalogue);
@@ -236,7 +238,7 @@ fn follow(
                 graph.bounds.iter().map(|(bound, failed)| bound.told(*failed, most_waiting, effort.transitions)),
             );
             explored = explored.and(graph.explored());
-            if let Some(parent) = around.parent.as_ref().filter(|_| numbers == all && verified) {
+            if let Some(parent) = around.parent.as_ref().filter(|_| numbers == all && verified && pure) {
                 shows = Some(Arc::new(graph.derived(parent)));
             }
             asked.extend(product.worlds.asked());
