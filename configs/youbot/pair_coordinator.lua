@@ -47,9 +47,10 @@ return state {
   lowering = both("e_left_out", "e_right_out", function(robots)
     local asked, each = {}, {}
     for _, robot in ipairs(robots) do
-      local ask = { "e_" .. robot .. "_close", robot .. "/e_shutdown" }
-      for _, word in ipairs(ask) do table.insert(asked, word) end
-      table.insert(each, { "e_" .. robot .. "_gone", ask })
+      local close = "e_" .. robot .. "_close"
+      table.insert(asked, close)
+      table.insert(asked, robot .. "/e_shutdown")
+      table.insert(each, { "e_" .. robot .. "_gone", close })
     end
     table.insert(each, { "e_shutdown", asked })
     return each

@@ -8,8 +8,8 @@ return state {
 
   -- There is no world: nothing is placed.
   idle      = state {},
-  -- The world is to be taken away, and the robot is not in it. It is heard whether it had anything to do.
-  closing   = state {},
+  -- The world is to be taken away, and the robot is not in it. It is asked to end, too: whether it has nothing to do is told to who asks.
+  closing   = state { entry = of "e_shutdown" },
   departing = state { entry = of "e_released" },
 
   -- It is not built.

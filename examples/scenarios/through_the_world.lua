@@ -23,7 +23,7 @@ set("World.bar", bar, { force = true, within = 60 })
 wait(0.5)
 local from = { tool(1), tool(2) }
 
-local packets = signal("right/Link_Rx.link_stats.received")
+local packets = signal("right/Link_Rx.link_stats.seq")
 local s = sample{ every = 0.001, name = "pushed", signals = {
   bar = "World.bar_position", left = "World.robot1_tool_pose.p[0]", right = "World.robot2_tool_pose.p[0]",
   on_left = "World.robot1_contact[0]", on_right = "World.robot2_contact[0]", hand = "left/Operator.ext_force[0]",
@@ -38,7 +38,7 @@ expect{ name = "the right one was carried", value = 1000 * carried, min = 1000 *
 expect{ name = "which it felt", value = s:max("on_right"), min = 2, unit = "N" }
 expect{ name = "and so did the left one", value = -s:min("on_left"), min = 2, unit = "N" }
 expect{ name = "coupled meanwhile", value = s:max("coupled"), max = 0 }
-expect{ name = "packets meanwhile", value = signal("right/Link_Rx.link_stats.received") - packets, max = 0 }
+expect{ name = "packets meanwhile", value = signal("right/Link_Rx.link_stats.seq") - packets, max = 0 }
 
 -- What the bar is pushed with on one side it pushes with on the other, but for its own mass and rails.
 local sum, force = 0, 0

@@ -126,3 +126,45 @@ fn each_is_told_of_once_and_only_its_parent_hears() {
         assert!(joined >= last);
     });
 }
+
+/// One goes down alone and comes up again; the other one, which is in the same world, goes on.
+#[test]
+fn one_goes_down_alone_and_comes_up_again() {
+    up("youbot_coupling.yaml", |both| {
+        both.wait_for(&["left:copying", "right:copying"], 20.0);
+        both.raise("left/e_shutdown");
+        both.wait_for(&["left:idle", "left_place:away"], 10.0);
+        assert!(both.is("right:operational") && both.is("pair:joined"), "{:?}", both.session.hub().active());
+        let told = |word: &str| both.events().iter().filter(|(_, event)| event.starts_with(word)).count();
+        assert_eq!((told("right/e_EC_TIMEOUT"), told("left/e_EC_TIMEOUT"), told("left/stranded")), (0, 0, 0));
+        let left = |name: &str| name.starts_with("left/");
+        assert!(!both.session.system().unwrap().components.keys().any(|name| left(name.as_str())));
+        both.raise("left/e_start");
+        both.wait_for(&["left:copying", "right:copying"], 30.0);
+        // And all of it once more while one is down.
+        both.raise("right/e_shutdown");
+        both.wait_for(&["right:idle", "right_place:away"], 10.0);
+        both.raise("e_shutdown");
+        both.wait_for(&["pair:idle", "left:idle", "right:idle"], 20.0);
+    });
+}
+
+/// A robot alone is in no world: its driver waits for its arm, then says so, and nothing has moved.
+#[test]
+fn a_robot_without_a_world_does_not_come_up_and_says_why() {
+    let clock = Clock::simulated();
+    let _participant = clock.enter();
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("deployments/youbot_robot.yaml");
+    let read = app::read(&path, &LoadOptions::default(), libraries::builtin()).unwrap();
+    let session = app::start(&app::check(read).unwrap(), &clock).unwrap();
+    let heard: Arc<Mutex<Vec<String>>> = Arc::default();
+    let own = heard.clone();
+    session.hub().observe(Arc::new(move |_, happening| own.lock().unwrap().push(format!("{happening:?}"))));
+    assert!(session.bring_up().is_err());
+    let heard = heard.lock().unwrap();
+    let says = |word: &str| heard.iter().any(|line| line.contains(word));
+    assert!(says("nothing answers on the field bus") && !says("e_EC_TIMEOUT") && !says("unfold.ok"), "{heard:#?}");
+    assert!(seconds(clock.now()) < 10.0, "{}", seconds(clock.now()));
+    drop(heard);
+    session.take_down(false);
+}

@@ -148,6 +148,11 @@ fn shutdown_while_copying() {
 }
 
 #[test]
+fn through_the_world() {
+    run("through_the_world");
+}
+
+#[test]
 fn tracking() {
     run("tracking");
 }
