@@ -1,7 +1,6 @@
 -- Coordinator of two coupled robots. It knows of each of them what that one's file accepts and emits, and no state, no component and no
 -- configuration of it: it makes the world and the networks, begins both robots, leads both down, and takes world and networks away.
--- What keeps a robot in the world while it is built is a coordinator beside this one, for each robot (place.lua): one may go down alone, and
--- come up again.
+-- What keeps a robot in the world while it is built is a coordinator beside this one, for each robot (place.lua).
 --
 -- `left/up` and `left/failed` are told without being written.
 
