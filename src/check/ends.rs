@@ -168,7 +168,7 @@ impl Product<'_> {
         let world = self.worlds.broken(state.world, requests.iter().map(|request| request.ask));
         let mut state = state.clone();
         if !self.tells_all {
-            state.unconfirmed.clear();
+            state.waits_for_none();
         }
         self.ended(&state, number, requests, &End { went: &Went::to(world), given, class: Failed::Broken }, nexts);
     }
@@ -178,9 +178,7 @@ impl Product<'_> {
         let End { went, given, class } = end;
         let mut next = state.clone();
         self.go(&mut next, went);
-        next.interrupted.retain(|of| of.number != number);
-        next.joined.retain(|of| *of != number);
-        next.placed.retain(|of| *of != number);
+        next.forget_batch(number);
         let gone = self.desks.all_answered(&mut next.desk, number, given);
         let mut answers = Answers::new();
         for ((place, verdict), gone) in given.iter().zip(gone.iter()) {
@@ -228,7 +226,9 @@ impl Product<'_> {
     /// What a request that was carried out leaves to be waited for.
     fn applied(&self, state: &mut ProductState, request: &Request, verdict: Verdict, went: &Went) {
         let (Ask::Apply(id), Verdict::Ok) = (request.ask, verdict) else { return };
-        state.lost.retain(|lost| *lost != id);
+        if state.lost.contains(&id) {
+            state.change(|seldom| seldom.lost.retain(|lost| *lost != id));
+        }
         self.stands_for(state, id);
         let waits = self.worlds.configuration(id).is_some_and(|c| c.confirm.is_some());
         // One batch may push several of them.
@@ -238,7 +238,7 @@ impl Product<'_> {
         if let (true, Some(place)) = (waits, pushed.next().map(|(_, place)| *place).or(unknown)) {
             // In which state it was asked for means nothing any more.
             let request = Request { why: Why::Asked, tag: (0, 0), ..*request };
-            state.unconfirmed.push(Unconfirmed { place, request });
+            state.change(|seldom| seldom.unconfirmed.push(Unconfirmed { place, request }));
         }
     }
 
@@ -346,7 +346,7 @@ impl Product<'_> {
     /// How a safe configuration may end.
     pub(super) fn safe_ends(&mut self, state: &ProductState, at: usize, nexts: &mut Nexts) {
         let mut over = state.clone();
-        let request = &over.safe.remove(at);
+        let request = &over.change(|seldom| seldom.safe.remove(at));
         if let Some(top) = self.worlds.top(state.world) {
             for verdict in [Verdict::Ok, Verdict::Broken] {
                 let mut next = over.clone();
@@ -382,7 +382,7 @@ impl Product<'_> {
             let mut next = over;
             next.world = self.worlds.topped(top, std::iter::once(request.ask));
             if !self.tells_all {
-                next.unconfirmed.clear();
+                next.waits_for_none();
             }
             self.safe_told(next, request, Verdict::Broken, Failed::Broken, nexts);
         }

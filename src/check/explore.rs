@@ -402,10 +402,12 @@ impl Graph<'_, '_> {
         self.cut(Bound::ByHand, so_far);
         let top = Top { safe: true, actuator: self.product.worlds.has_actuator(state.world) };
         state.world = self.product.worlds.topped(top, std::iter::empty());
-        state.unconfirmed.clear();
-        // What it interrupts may be over before, or not have begun: all the same where nothing is known.
-        state.safe.retain(|request| request.requester != Requester::Operator);
-        state.in_transit.clear();
+        state.change(|seldom| {
+            seldom.unconfirmed.clear();
+            // What it interrupts may be over before, or not have begun: all the same where nothing is known.
+            seldom.safe.retain(|request| request.requester != Requester::Operator);
+            seldom.in_transit.clear();
+        });
         (state, failed.max(Failed::Undo))
     }
 

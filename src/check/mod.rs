@@ -61,6 +61,7 @@ mod report;
 mod rounds;
 mod run;
 mod safety;
+mod seldom;
 mod settings;
 mod shape;
 mod shared_list;

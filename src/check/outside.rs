@@ -30,7 +30,7 @@ impl Product<'_> {
             next.world = world;
             (next.stopping, next.elsewhere) = (false, false);
             next.leaving = false;
-            next.unconfirmed.clear();
+            next.waits_for_none();
             self.review_standings(&mut next);
             nexts.all.push(Next::plain(Move::OthersDown, next, Failed::Nothing));
         }
@@ -46,7 +46,7 @@ impl Product<'_> {
             if !next.in_transit.is_empty() {
                 continue;
             }
-            next.safe.retain(|safe| safe.requester != Requester::Safety);
+            next.change(|seldom| seldom.safe.retain(|safe| safe.requester != Requester::Safety));
             next.elsewhere = next.stopping;
             self.begin(&mut next);
             nexts.all.push(Next::plain(Move::Elsewhere(id), self.settle(next), Failed::Apply));
@@ -175,7 +175,7 @@ impl Product<'_> {
         for (at, waits) in state.unconfirmed.iter().enumerate() {
             let Ask::Apply(id) = waits.request.ask else { continue };
             let mut next = state.clone();
-            next.unconfirmed.remove(at);
+            next.change(|seldom| seldom.unconfirmed.remove(at));
             nexts.all.push(Next::plain(Move::Confirmed(id), next, Failed::Nothing));
             self.unconfirmed(state, at, id, nexts);
         }
@@ -189,13 +189,15 @@ impl Product<'_> {
             }
             let event = Verdict::Lost.event(Ask::Apply(id));
             let mut next = state.clone();
-            next.lost.push(id);
-            next.lost.sort_unstable();
+            next.change(|seldom| {
+                seldom.lost.push(id);
+                seldom.lost.sort_unstable();
+            });
             let class = if holds { Failed::Apply } else { Failed::Broken };
             if !holds {
                 // What differs stays as it is until somebody undoes or recovers it.
                 next.world = self.worlds.broken(state.world, std::iter::empty());
-                next.unconfirmed.clear();
+                next.waits_for_none();
             }
             self.spread(&mut next, event, None);
             let by = Move::Lost(id);
@@ -226,7 +228,7 @@ impl Product<'_> {
         let why = Why::Unconfirmed(frame);
         let request = Request { ask: Ask::UndoOf(id), scope: None, why, ..waits.request };
         let mut left = state.clone();
-        left.unconfirmed.remove(at);
+        left.change(|seldom| seldom.unconfirmed.remove(at));
         if self.tells_all {
             // It is a request like others, and takes its time.
             self.desks
@@ -249,7 +251,7 @@ impl Product<'_> {
         if comes.can_fail.contains(&true) {
             self.tell(left.clone(), told(Verdict::UndoFailed), Failed::Undo, nexts);
             let mut broken = left.clone();
-            broken.unconfirmed.clear();
+            broken.waits_for_none();
             broken.world = self.worlds.broken(state.world, std::iter::once(request.ask));
             self.tell(broken, told(Verdict::UndoBroken), Failed::Broken, nexts);
         }

@@ -18,6 +18,7 @@ use super::desks::{Desks, PlainBatch};
 use super::effort::{Effort, Left};
 use super::members::{Member, hears_loss, members};
 use super::outcome::{Comes, ConcurrentWork, EMPTY, Held, Went, WorldId};
+use super::seldom::SharedSeldom;
 use super::shared_list::SharedList;
 use super::state::{Failed, Move, Next, Nexts, ProductState, Reacts, Unconfirmed, bit, index, one};
 use super::world::Worlds;
@@ -193,27 +194,17 @@ impl<'a> Product<'a> {
             leaves: entered.iter().map(|reaction| reaction.leaf).collect(),
             world: EMPTY,
             desk: self.desks.empty(),
-            interrupted: SharedList::new(),
-            joined: SharedList::new(),
-            placed: SharedList::new(),
-            safe: SharedList::new(),
-            due: SharedList::new(),
-            telling: SharedList::new(),
-            stayed: false,
             inbox: SharedList::new(),
-            unconfirmed: SharedList::new(),
-            lost: SharedList::new(),
             stands: SharedList::new(),
-            over: SharedList::new(),
+            seldom: SharedSeldom::default(),
+            stayed: false,
             aside: false,
-            down: 0,
             stopping: false,
             leaving: false,
             elsewhere: false,
-            children: 0,
-            moved: 0,
             across: false,
-            in_transit: SharedList::new(),
+            down: 0,
+            children: 0,
         };
         let mut states = one(state);
         for (by, reaction) in entered.iter().enumerate() {
@@ -261,7 +252,7 @@ impl<'a> Product<'a> {
             let mine = |(request, _): &(Request, Verdict)| self.member(request.requester) == Some(number);
             if let Some(at) = state.telling.iter().position(mine) {
                 let mut next = state.clone();
-                let (request, verdict) = next.telling.remove(at);
+                let (request, verdict) = next.change(|seldom| seldom.telling.remove(at));
                 let event = self.members[number].answer(request.ask, verdict);
                 self.hear(next, number, event, Move::Taken(own, event), &mut nexts);
                 let urgent = self.takes_next(state, number).into_iter().filter(|takes| takes.urgent);
@@ -278,7 +269,7 @@ impl<'a> Product<'a> {
     fn answers_come(&mut self, state: &ProductState, nexts: &mut Nexts) {
         if let Some((request, verdict)) = state.due.first().copied() {
             let mut next = state.clone();
-            next.due.remove(0);
+            next.change(|seldom| seldom.due.remove(0));
             for next in self.lands(next) {
                 self.tell(next, SmallVec::from_iter([(request, verdict)]), Failed::Nothing, nexts);
             }
@@ -322,7 +313,10 @@ impl<'a> Product<'a> {
         state.stopping &= self.waits_for_others() || !(state.is_at_rest() && self.all_in(&state, |member| member.down));
         state.elsewhere &= state.stopping;
         if state.inbox.is_empty() {
-            (state.moved, state.across) = (0, false);
+            state.across = false;
+            if state.moved != 0 {
+                state.change(|seldom| seldom.moved = 0);
+            }
         }
         state
     }
@@ -348,7 +342,8 @@ impl<'a> Product<'a> {
             let place = |waits: &Unconfirmed| places.get(usize::from(waits.place)).copied().flatten();
             let there =
                 state.unconfirmed.iter().filter_map(|waits| Some(Unconfirmed { place: place(waits)?, ..*waits }));
-            state.unconfirmed = there.collect();
+            let there = there.collect();
+            state.change(|seldom| seldom.unconfirmed = there);
         }
         self.review_standings(state);
     }

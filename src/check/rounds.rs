@@ -174,7 +174,7 @@ impl Graph<'_, '_> {
             return true;
         }
         state.world = world;
-        state.unconfirmed.clear();
+        state.waits_for_none();
         let (failed, depth) = (self.failed[at as usize].max(worst), self.depth[at as usize] + 1);
         let to = self.reach(state, failed, depth);
         let number = u32::try_from(self.edges.len()).unwrap_or(NOWHERE);
