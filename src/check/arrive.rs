@@ -3,11 +3,12 @@
 use super::desks::{AnsweredPlaces, Coming, is_left};
 use super::product::{Product, as_begun};
 use super::reactions::Macrostep;
-use super::state::{Answers, Failed, Interrupted, Move, Next, Nexts, ProductState, States, Unconfirmed, bit, index, one};
+use super::seldom::{Interrupted, Unconfirmed};
+use super::state::{Answers, Failed, Move, Next, Nexts, ProductState, States, bit, index, one};
 use crate::limits;
 use crate::model::{Ask, ConfigId, EventName, Findings, Verdict, codes};
 use crate::stack::{ActiveBatch, Arrived, Batch, Desk, LedDown, Request, Requester, Why, given_up_of};
-use crate::statechart::{EventId, NodeId};
+use crate::statechart::EventId;
 use smallvec::SmallVec;
 use std::rc::Rc;
 
@@ -31,7 +32,7 @@ impl Product<'_> {
     /// Brings a reaction of a coordinator into a state. More than one: it makes a difference what is over already.
     pub(super) fn follow(&mut self, mut state: ProductState, by: usize, reaction: &Macrostep) -> States {
         state.leaves[by] = reaction.leaf;
-        self.forget(&mut state, by, &reaction.left);
+        self.forget(&mut state, by, reaction);
         let mut states = one(state);
         // A coordinator that does not come to rest asks without end, and each time may come before or after what ends.
         self.forked |= reaction.handed.len() > limits::CHECK_HANDED;
@@ -51,14 +52,14 @@ impl Product<'_> {
     }
 
     /// Nobody hears the answers any more whose state has been left.
-    fn forget(&self, state: &mut ProductState, by: usize, left: &[NodeId]) {
+    fn forget(&self, state: &mut ProductState, by: usize, Macrostep { left, number: macrostep, .. }: &Macrostep) {
         if left.is_empty() {
             return;
         }
         let requester = self.members[by].by;
         let gone = |request: &Request| is_left(request, requester, left);
         if !state.desk.is_empty() {
-            self.desks.leave(&mut state.desk, requester, left);
+            self.desks.leave(&mut state.desk, requester, left, macrostep);
         }
         if state.seldom.is_nothing() {
             return;
@@ -269,7 +270,7 @@ impl Product<'_> {
                 if comes.takes() > 1 && !beside.joined {
                     state.change(|seldom| seldom.joined.push(number));
                 }
-                comes.group.places.contains(&place)
+                comes.group.places().any(|of| of == place)
             }
         };
         if !begun {
@@ -281,9 +282,10 @@ impl Product<'_> {
     pub(super) fn cancel_behind(&self, state: &mut ProductState, number: u32, place: usize) {
         let request = state.desk.active(number).and_then(|active| active.batch.requests.get(place)).copied();
         let given = AnsweredPlaces::from_iter([(place, Some(Verdict::Cancelled))]);
-        let gone = self.desks.all_answered(&mut state.desk, number, &given);
+        let given = self.desks.given(given);
+        let answered = self.desks.all_answered(&mut state.desk, number, &given);
         request.into_iter().for_each(|request| self.due(state, request, Verdict::Cancelled));
-        gone.iter().flat_map(|gone| &gone.undone).for_each(|(undo, verdict)| self.due(state, *undo, *verdict));
+        answered.undone.iter().for_each(|(undo, verdict)| self.due(state, *undo, *verdict));
     }
 
     /// An answer is on its way, if anybody waits for it (or all are to be given).
@@ -380,27 +382,49 @@ impl Product<'_> {
 
     /// Puts an event into the inbox of everybody but the one that emits it.
     pub(super) fn spread(&mut self, state: &mut ProductState, name: EventName, but: Option<usize>) {
-        for number in 0..self.members.len() {
-            let member = &mut self.members[number];
-            let event = member.chart.event(name);
-            let own = index(number);
-            // Nothing can bring it elsewhere before it takes the event, and here the event does nothing.
-            let settled = state.outstanding(member.by) == 0 && !state.inbox.iter().any(|(to, _)| *to == own);
-            let alone = but.is_none() && self.members.len() == 1;
-            let member = &mut self.members[number];
-            if Some(number) == but
-                || event == EventId::OTHER
-                || (settled || alone) && !member.react(state.leaves[number], event).taken
-            {
-                continue;
-            }
+        let hearers = self.hearers(state, name, but);
+        self.spread_to(state, &hearers);
+    }
+
+    /// Puts an event into the inboxes of these, as each knows it.
+    pub(super) fn spread_to(&mut self, state: &mut ProductState, hearers: &[(u8, EventId)]) {
+        if hearers.is_empty() {
+            return;
+        }
+        for hears in hearers {
             if state.inbox.len() >= self.most_between() {
                 self.overflow = true;
                 continue;
             }
-            state.inbox.push((own, event));
+            state.inbox.push(*hears);
         }
         state.inbox.sort_by_key(|(to, _)| *to);
+    }
+
+    /// Who may take an event, but the one that emits it, and as what each knows it.
+    pub(super) fn hearers(
+        &mut self,
+        state: &ProductState,
+        name: EventName,
+        but: Option<usize>,
+    ) -> SmallVec<[(u8, EventId); 2]> {
+        let mut hearers = SmallVec::new();
+        for number in 0..self.members.len() {
+            let member = &self.members[number];
+            let event = member.chart.event(name);
+            let own = index(number);
+            if Some(number) == but || event == EventId::OTHER {
+                continue;
+            }
+            // Nothing can bring it elsewhere before it takes the event, and here the event does nothing.
+            let settled = || state.outstanding(member.by) == 0 && !state.inbox.iter().any(|(to, _)| *to == own);
+            let alone = but.is_none() && self.members.len() == 1;
+            if (alone || settled()) && !self.members[number].react(state.leaves[number], event).taken {
+                continue;
+            }
+            hearers.push((own, event));
+        }
+        hearers
     }
 
     /// Frames that waited for this event have been confirmed; perhaps, where it may be too late and what takes one back waits
@@ -422,7 +446,7 @@ impl Product<'_> {
     }
 
     /// Gives answers, one after the other; each is heard before the next comes.
-    pub(super) fn tell(&mut self, mut state: ProductState, answers: Answers, failed: Failed, nexts: &mut Nexts) {
+    pub(super) fn tell(&mut self, mut state: ProductState, answers: &Answers, failed: Failed, nexts: &mut Nexts) {
         self.begin(&mut state);
         if self.tells_all && self.members.len() > 1 {
             state.change(|seldom| {

@@ -1,7 +1,8 @@
 //! Whether every way leads down, and what it leaves behind.
 
 use super::closed::{fails, still_comes};
-use super::explore::{Barred, Edge, Graph};
+use super::edges::{Barred, Edge};
+use super::explore::Graph;
 use super::judge::Traced;
 use super::members::Member;
 use super::product::Product;
@@ -140,7 +141,7 @@ impl Graph<'_, '_> {
         let begun: Vec<u32> = begun.collect();
         // What came just before is overtaken by the event that ends the deployment, and heard behind it. Where that leads nowhere
         // it is told as unhandled.
-        let heard = self.edges.iter().filter(|edge| !stops(edge.from) && stops(edge.to) && !edge.dropped);
+        let heard = self.edges.iter().filter(|edge| !stops(edge.from) && stops(edge.to) && !edge.dropped());
         let heard = heard.map(|edge| edge.to).collect();
         let stale = self.spread_from(heard, |number, edge| stops(edge.to) && bars[number] == Some(Barred::Closed));
         let stale = (0u32..).zip(stale).filter(|(_, stale)| *stale).map(|(at, _)| at);

@@ -1,9 +1,9 @@
 //! What states of the product are made of, kept once: of a hundred thousand states most have lists that others have as
 //! well, come to on other ways.
 
-use super::seldom::{Seldom, SharedSeldom};
+use super::seldom::{Interrupted, Seldom, SharedSeldom, Unconfirmed};
 use super::shared_list::SharedList;
-use super::state::{Interrupted, ProductState, Unconfirmed};
+use super::state::ProductState;
 use crate::model::{ComponentName, ConfigId, Verdict};
 use crate::stack::{Batch, Request};
 use crate::statechart::EventId;

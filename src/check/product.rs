@@ -17,10 +17,11 @@ use super::coupling;
 use super::desks::{Desks, PlainBatch};
 use super::effort::{Effort, Left};
 use super::members::{Member, hears_loss, members};
+use super::offers::AllOffers;
 use super::outcome::{Comes, ConcurrentWork, EMPTY, Held, Went, WorldId};
-use super::seldom::SharedSeldom;
+use super::seldom::{SharedSeldom, Unconfirmed};
 use super::shared_list::SharedList;
-use super::state::{Failed, Move, Next, Nexts, ProductState, Reacts, Unconfirmed, bit, index, one};
+use super::state::{Failed, Move, Next, Nexts, ProductState, Reacts, bit, index, one};
 use super::world::Worlds;
 use crate::limits;
 use crate::model::{Catalogue, ConfigId, Deployment, EventName, Precedence, Verdict};
@@ -101,6 +102,8 @@ pub struct Product<'a> {
     pub(super) effort: Left<'a>,
     /// What is known of reactions to steps.
     pub(super) reacts: FxHashMap<(WorldId, PlainBatch, ConcurrentWork), Reacts>,
+    /// What coordinators hear in each leaf.
+    pub(super) offers: AllOffers,
     /// Room for what follows, used again and again.
     pub(super) spare: Vec<Next>,
 }
@@ -157,6 +160,7 @@ impl<'a> Product<'a> {
             watched: Vec::new(),
             effort: Effort::default().into(),
             reacts: FxHashMap::default(),
+            offers: AllOffers::default(),
             spare: Vec::new(),
         };
         (product.worlds.judged, product.unjudged) = super::stands::judged(deployment, catalogue, charts);
@@ -270,8 +274,9 @@ impl<'a> Product<'a> {
         if let Some((request, verdict)) = state.due.first().copied() {
             let mut next = state.clone();
             next.change(|seldom| seldom.due.remove(0));
+            let answers = SharedList::from_iter([(request, verdict)]);
             for next in self.lands(next) {
-                self.tell(next, SmallVec::from_iter([(request, verdict)]), Failed::Nothing, nexts);
+                self.tell(next, &answers, Failed::Nothing, nexts);
             }
         }
         // Those that have nothing to do with each other end in any order.
@@ -331,7 +336,7 @@ impl<'a> Product<'a> {
             self.desks.change(&mut state.desk, |desk| {
                 for request in desk.requests_mut() {
                     if let Why::Unconfirmed(frame) = request.why {
-                        let place = self.worlds.place(from, frame).and_then(|at| places.get(at).copied().flatten());
+                        let place = self.worlds.place(from, frame).and_then(|at| places.of.get(at).copied().flatten());
                         let frame = place.and_then(|place| self.worlds.frame(went.world, place));
                         request.why = Why::Unconfirmed(frame.unwrap_or(FrameId(0)));
                     }
@@ -339,7 +344,7 @@ impl<'a> Product<'a> {
             });
         }
         if let Some(places) = went.places.as_ref().filter(|_| !state.unconfirmed.is_empty()) {
-            let place = |waits: &Unconfirmed| places.get(usize::from(waits.place)).copied().flatten();
+            let place = |waits: &Unconfirmed| places.of.get(usize::from(waits.place)).copied().flatten();
             let there =
                 state.unconfirmed.iter().filter_map(|waits| Some(Unconfirmed { place: place(waits)?, ..*waits }));
             let there = there.collect();

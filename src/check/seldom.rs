@@ -3,11 +3,31 @@
 //! Most states have nothing of it. It is behind one pointer, shared by all states that have it of each other until one changes it,
 //! and none where there is nothing: so states are small, equal where they are the same, and copied in no time.
 
+use super::outcome::WorldId;
 use super::shared_list::SharedList;
-use super::state::{Interrupted, Unconfirmed};
 use crate::model::{ConfigId, Verdict};
 use crate::stack::{Batch, Request};
 use std::rc::Rc;
+
+/// A batch under way that a safe configuration has interrupted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Interrupted {
+    /// The number of the batch.
+    pub number: u32,
+    /// The world in which it was planned.
+    pub planned: WorldId,
+    /// So many undos had given something of it up before.
+    pub given_up: usize,
+}
+
+/// A frame that waits for its confirmation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Unconfirmed {
+    /// Its place among the frames that count.
+    pub place: u8,
+    /// The request that pushed it.
+    pub request: Request,
+}
 
 /// What few states have.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
@@ -29,8 +49,8 @@ pub struct Seldom {
     pub unconfirmed: SharedList<Unconfirmed>,
     /// Configurations that were lost, and are not applied anew.
     pub lost: SharedList<ConfigId>,
-    /// Configurations in force of which one of those that [`stands`](super::state::ProductState::stands) lists was stopped since: what
-    /// they stand for is watched no more.
+    /// Configurations in force of which something that ran when they were applied was stopped since: what they stand for is watched
+    /// no more.
     pub over: SharedList<ConfigId>,
     /// Batches on their way, the first of which would stop what is under way: what it would stop ends before.
     pub in_transit: SharedList<Batch>,

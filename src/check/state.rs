@@ -2,7 +2,7 @@
 
 use super::desks::KeptDesk;
 use super::outcome::WorldId;
-use super::seldom::{Seldom, SharedSeldom};
+use super::seldom::{Interrupted, Seldom, SharedSeldom};
 use super::shared_list::SharedList;
 use crate::model::codes::{STACK_EMPTY, STACK_NO_FRAME};
 use crate::model::{Ask, ComponentName, ConfigId, Findings, Verdict};
@@ -24,26 +24,6 @@ pub enum Failed {
     Undo,
     /// Something is left in between, and nothing is known any more.
     Broken,
-}
-
-/// A batch under way that a safe configuration has interrupted.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct Interrupted {
-    /// The number of the batch.
-    pub number: u32,
-    /// The world in which it was planned.
-    pub planned: WorldId,
-    /// So many undos had given something of it up before.
-    pub given_up: usize,
-}
-
-/// A frame that waits for its confirmation.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct Unconfirmed {
-    /// Its place among the frames that count.
-    pub place: u8,
-    /// The request that pushed it.
-    pub request: Request,
 }
 
 /// A state of the product.
@@ -202,7 +182,7 @@ pub enum Move {
 }
 
 /// The answers that a move gives.
-pub type Answers = SmallVec<[(Request, Verdict); 1]>;
+pub type Answers = SharedList<(Request, Verdict)>;
 
 /// Reactions of the simulated platform, by their places among them.
 pub type Reacts = SmallVec<[u16; 2]>;

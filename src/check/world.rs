@@ -8,7 +8,8 @@
 //! After *broken* nothing is known any more: that is a world of its own ([`Top`]).
 
 use super::desks::PlainBatch;
-use super::outcome::{Comes, ConcurrentWork, Held, SafeComes, Went, Whose, WorldId};
+use super::kept::KeptValues;
+use super::outcome::{Comes, ConcurrentWork, EndsSo, FramePlaces, Held, SafeComes, Went, Whose, WorldId};
 use super::shape::{Counted, Shapes, Undone};
 use super::systems::{SystemId, Systems};
 use crate::limits;
@@ -69,6 +70,8 @@ pub struct Worlds<'a> {
     pub(super) systems: Systems,
     pub(super) comes: FxHashMap<(WorldId, PlainBatch, ConcurrentWork), Rc<Comes>>,
     safes: FxHashMap<(WorldId, Request, Held), Rc<SafeComes>>,
+    /// How batches may end: many may so in many worlds.
+    pub(super) ends: KeptValues<Vec<EndsSo>>,
     pub(super) helds: FxHashMap<(WorldId, PlainBatch, ConcurrentWork), Held>,
     pub(super) withouts: FxHashMap<(WorldId, SmallVec<[Whose; 2]>), Option<Went>>,
     pub(super) asked: FxHashSet<ConfigId>,
@@ -97,6 +100,7 @@ impl<'a> Worlds<'a> {
             systems: Systems::default(),
             comes: FxHashMap::default(),
             safes: FxHashMap::default(),
+            ends: KeptValues::default(),
             helds: FxHashMap::default(),
             withouts: FxHashMap::default(),
             asked: FxHashSet::default(),
@@ -336,16 +340,16 @@ impl<'a> Worlds<'a> {
     pub(super) fn went(&mut self, from: WorldId, world: World, system: SystemId, pushed: &[FrameId]) -> Went {
         let [deep, left] = self.more_than([limits::CHECK_FRAMES, limits::CHECK_LEFT], &world);
         if !self.confirms {
-            return Went { world: self.intern(world, system), places: None, pushed: SmallVec::new(), deep, left };
+            return Went { world: self.intern(world, system), places: None, deep, left };
         }
         let (counted, ids) = self.shapes.of(&world.stack);
         let place = |id: &FrameId| ids.iter().position(|other| other == id).and_then(|at| u8::try_from(at).ok());
         let before = self.ids(from).to_vec();
-        let places = before.iter().map(place).collect();
+        let of_before = before.iter().map(place).collect();
         let of = |id: &FrameId| world.stack.frame(*id).map(|frame| frame.configuration);
         let pushed = pushed.iter().filter_map(|id| Some((of(id)?, place(id)?))).collect();
         let world = self.intern_shaped(world, system, counted, ids);
-        Went { world, places: Some(Rc::new(places)), pushed, deep, left }
+        Went { world, places: Some(Rc::new(FramePlaces { of: of_before, pushed })), deep, left }
     }
 
     /// Of each of these bounds, a configuration of which one requester has more frames than that. Those of another one come of
