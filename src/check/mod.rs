@@ -36,6 +36,7 @@ mod follow;
 mod held;
 mod inbox;
 mod interface;
+mod interned;
 mod judge;
 mod kept;
 mod lasts;
