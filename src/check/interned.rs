@@ -49,7 +49,8 @@ impl Worlds<'_> {
         if let Some(id) = self.index.get(&hash).and_then(|ids| ids.iter().find(same)) {
             return *id;
         }
-        let id = self.next();
+        let (id, mut world) = (self.next(), world);
+        self.shapes.share(&mut world.stack);
         let safe = world.stack.safe().next().is_some();
         let piled_up = world.stack.frames().iter().any(|frame| frame.is_squashed());
         let mut actuator = false;

@@ -190,6 +190,11 @@ impl Shapes {
         shape
     }
 
+    /// The stack is made of frames that are kept already where they are the same.
+    pub fn share(&mut self, stack: &mut Stack) {
+        stack.share(|frame| self.frames.keep(frame));
+    }
+
     fn work_out(&mut self, stack: &Stack) -> Shape {
         let frames = stack.frames();
         let counts: Vec<bool> = frames.iter().map(|frame| self.undone.counts(frame)).collect();
