@@ -1,7 +1,7 @@
 //! Worlds, each once: which of them are one for whoever asks.
 
 use super::outcome::{FramePlaces, Went, WorldId};
-use super::shape::Shape;
+use super::shape::StackShape;
 use super::systems::SystemId;
 use super::world::{Exact, Knowledge, Worlds};
 use crate::stack::{FrameId, World};
@@ -33,7 +33,7 @@ impl Worlds<'_> {
         self.intern_shaped(world, system, &shape)
     }
 
-    fn intern_shaped(&mut self, world: World, system: SystemId, shape: &Rc<Shape>) -> WorldId {
+    fn intern_shaped(&mut self, world: World, system: SystemId, shape: &Rc<StackShape>) -> WorldId {
         let mut hasher = FxHasher::default();
         (system, &shape.counted).hash(&mut hasher);
         let in_order = self.shapes.undone.in_order;

@@ -33,6 +33,7 @@ mod exports;
 mod failing;
 #[cfg(any(test, feature = "internals"))]
 mod follow;
+mod heard;
 mod held;
 mod inbox;
 mod interface;

@@ -11,7 +11,7 @@ use crate::statechart::{EdgeId, EventId};
 use smallvec::SmallVec;
 
 /// Events from outside that are heard somewhere, by their places, in order.
-type Heard = SmallVec<[usize; 8]>;
+type HeardEvents = SmallVec<[usize; 8]>;
 
 impl Product<'_> {
     /// What comes when nothing lies in the inboxes.
@@ -67,15 +67,15 @@ impl Product<'_> {
         }
         let state = ProductState { across: true, ..state.clone() };
         self.times_come(&state, nexts);
-        let mut all = Heard::from_slice(&self.alike);
+        let mut all = HeardEvents::from_slice(&self.alike);
         all.sort_unstable();
         all.dedup();
         self.events_come(&state, all, nexts);
     }
 
     /// Time passes for each. Answers the events from outside that are heard where they are.
-    fn times_come(&mut self, state: &ProductState, nexts: &mut Nexts) -> Heard {
-        let mut heard = Heard::new();
+    fn times_come(&mut self, state: &ProductState, nexts: &mut Nexts) -> HeardEvents {
+        let mut heard = HeardEvents::new();
         for number in 0..self.members.len() {
             let member = &mut self.members[number];
             let offers = self.offers.of(number, member, state.leaves[number], &self.outside, &self.alike);
@@ -99,7 +99,7 @@ impl Product<'_> {
     }
 
     /// Each of these events comes from outside.
-    fn events_come(&mut self, state: &ProductState, heard: Heard, nexts: &mut Nexts) {
+    fn events_come(&mut self, state: &ProductState, heard: HeardEvents, nexts: &mut Nexts) {
         let busy: SmallVec<[bool; 4]> = (0..self.members.len()).map(|number| self.is_busy(state, number)).collect();
         let any_busy = busy.contains(&true);
         for at in heard {
@@ -147,7 +147,7 @@ impl Product<'_> {
     }
 
     /// The event that ends the deployment comes where nobody waits for it: it is raised once, and gone.
-    fn unheard_shutdown(&mut self, state: &ProductState, heard: &Heard, nexts: &mut Nexts) {
+    fn unheard_shutdown(&mut self, state: &ProductState, heard: &HeardEvents, nexts: &mut Nexts) {
         let shutdown = self.deployment.shutdown.event;
         let Some(at) = self.outside.iter().position(|name| *name == shutdown) else { return };
         if heard.contains(&at) || state.stopping || !self.minds_stopping || self.all_in(state, |member| member.down) {

@@ -51,12 +51,12 @@ pub struct Shapes {
     /// Of a frame (its content) among the frames that do not count, so many of which lie below it.
     under: FxHashMap<(FrameNumber, SmallVec<[FrameNumber; 4]>, usize), u32>,
     /// Of stacks that were met, by what their frames contain.
-    known: FxHashMap<SmallVec<[FrameNumber; 8]>, Rc<Shape>>,
+    known: FxHashMap<SmallVec<[FrameNumber; 8]>, Rc<StackShape>>,
 }
 
 /// What of a stack counts: always the same for frames that contain the same.
 #[derive(Debug)]
-pub struct Shape {
+pub struct StackShape {
     /// The frames that count, in a canonical order.
     pub counted: Box<[Counted]>,
     /// Their places on the stack.
@@ -67,7 +67,7 @@ pub struct Shape {
     pub left: Option<ConfigId>,
 }
 
-impl Shape {
+impl StackShape {
     /// The numbers of the frames that count, on a stack of this shape.
     pub fn ids<'s>(&'s self, stack: &'s Stack) -> impl Iterator<Item = FrameId> + 's {
         self.places.iter().map(|place| stack.frames()[usize::from(*place)].id)
@@ -179,7 +179,7 @@ impl Shapes {
     }
 
     /// What of a stack counts.
-    pub fn of(&mut self, stack: &Stack) -> Rc<Shape> {
+    pub fn of(&mut self, stack: &Stack) -> Rc<StackShape> {
         let numbers: SmallVec<[FrameNumber; 8]> =
             stack.frames().iter().map(|frame| self.frames.number(frame)).collect();
         if let Some(known) = self.known.get(&numbers) {
@@ -195,7 +195,7 @@ impl Shapes {
         stack.share(|frame| self.frames.keep(frame));
     }
 
-    fn work_out(&mut self, stack: &Stack) -> Shape {
+    fn work_out(&mut self, stack: &Stack) -> StackShape {
         let frames = stack.frames();
         let counts: Vec<bool> = frames.iter().map(|frame| self.undone.counts(frame)).collect();
         self.orders.note(frames, &counts);
@@ -250,7 +250,7 @@ impl Shapes {
             places.push(u16::try_from(place).unwrap_or(u16::MAX));
         }
         let [deep, left] = self.more_than([limits::CHECK_FRAMES, limits::CHECK_LEFT], stack);
-        Shape { counted: counted.into(), places: places.into(), deep, left }
+        StackShape { counted: counted.into(), places: places.into(), deep, left }
     }
 
     /// Of each of these bounds, a configuration of which one requester has more frames than that. Those of another one come of

@@ -10,7 +10,7 @@
 use super::desks::PlainBatch;
 use super::kept::KeptValues;
 use super::outcome::{Comes, ConcurrentWork, EndsSo, FramePlaces, Held, SafeComes, Went, Whose, WorldId};
-use super::shape::{Shape, Shapes, Undone};
+use super::shape::{Shapes, StackShape, Undone};
 use super::systems::{SystemId, Systems};
 use crate::limits;
 use crate::model::{Ask, Catalogue, ConfigId, Configuration, Deployment, RequestId};
@@ -52,7 +52,7 @@ pub(super) struct Exact {
     /// Frames have been squashed.
     pub piled_up: bool,
     /// Those of its frames that count.
-    pub shape: Rc<Shape>,
+    pub shape: Rc<StackShape>,
     /// Their numbers.
     pub ids: Box<[FrameId]>,
 }
