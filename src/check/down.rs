@@ -148,6 +148,10 @@ impl Graph<'_, '_> {
         let begun: Vec<u32> = stale.chain(begun).collect();
         let comes = self.spread_from(begun, |number, edge| stops(edge.to) && bars[number] != Some(Barred::Closed));
         for barred in [Barred::Again, Barred::Closed, Barred::Gone, Barred::Late, Barred::Reported] {
+            // Where nothing is barred so, as much leads down as before.
+            if !bars.contains(&Some(barred)) {
+                continue;
+            }
             let after = self.reaching_down(|number, _| bars[number].is_none_or(|of| of > barred));
             let lost = |at: &u32| {
                 let state = &self.states[*at as usize];

@@ -9,15 +9,14 @@
 
 use super::desks::PlainBatch;
 use super::kept::KeptValues;
-use super::outcome::{Comes, ConcurrentWork, EndsSo, FramePlaces, Held, SafeComes, Went, Whose, WorldId};
+use super::outcome::{Comes, ConcurrentWork, EndsSo, Held, SafeComes, Went, Whose, WorldId};
 use super::shape::{Shapes, StackShape, Undone};
 use super::systems::{SystemId, Systems};
-use crate::limits;
 use crate::model::{Ask, Catalogue, ConfigId, Configuration, Deployment, RequestId};
 use crate::plan::{PlanContext, Refusal, plan};
 use crate::stack::claims::Claims;
 use crate::stack::{BestEffort, FrameId, Reason, Request, Requester, Rules, SafeEnd, Stack, World, effort, take_up};
-use crate::system::{System, View, step};
+use crate::system::{System, step};
 use crate::time::Time;
 use rustc_hash::{FxHashMap, FxHashSet, FxHasher};
 use smallvec::SmallVec;
