@@ -1,14 +1,14 @@
-//! What coordinators hand on: requests come to the desk, emitted names to the others' inboxes.
+//! What coordinators hand on: requests come to the desk, and begin there.
 
 use super::desks::{AnsweredPlaces, Coming, is_left};
 use super::product::{Product, as_begun};
 use super::reactions::Macrostep;
-use super::shared_list::SharedList;
-use super::state::{Answers, Failed, Interrupted, Move, Next, Nexts, ProductState, States, bit, index, one};
+use super::seldom::Interrupted;
+use super::state::{ProductState, States, bit, one};
 use crate::limits;
-use crate::model::{Ask, ConfigId, EventName, Findings, Verdict, codes};
+use crate::model::{Ask, ConfigId, Findings, Verdict, codes};
 use crate::stack::{ActiveBatch, Arrived, Batch, Desk, LedDown, Request, Requester, Why, given_up_of};
-use crate::statechart::{EventId, NodeId};
+use crate::statechart::EventId;
 use smallvec::SmallVec;
 use std::rc::Rc;
 
@@ -24,7 +24,7 @@ impl Product<'_> {
         let (chart, deployment) = (self.members[by].chart, self.deployment);
         state.leaving &= !(reaction.taken && event == chart.event(deployment.deploy.event) && event != EventId::OTHER);
         if self.crosses {
-            state.moved |= bit(by);
+            state.change(|seldom| seldom.moved |= bit(by));
         }
         self.follow(state, by, &reaction)
     }
@@ -32,7 +32,7 @@ impl Product<'_> {
     /// Brings a reaction of a coordinator into a state. More than one: it makes a difference what is over already.
     pub(super) fn follow(&mut self, mut state: ProductState, by: usize, reaction: &Macrostep) -> States {
         state.leaves[by] = reaction.leaf;
-        self.forget(&mut state, by, &reaction.left);
+        self.forget(&mut state, by, reaction);
         let mut states = one(state);
         // A coordinator that does not come to rest asks without end, and each time may come before or after what ends.
         self.forked |= reaction.handed.len() > limits::CHECK_HANDED;
@@ -55,24 +55,29 @@ impl Product<'_> {
     }
 
     /// Nobody hears the answers any more whose state has been left.
-    fn forget(&self, state: &mut ProductState, by: usize, left: &[NodeId]) {
+    fn forget(&self, state: &mut ProductState, by: usize, Macrostep { left, number: macrostep, .. }: &Macrostep) {
         if left.is_empty() {
             return;
         }
         let requester = self.members[by].by;
         let gone = |request: &Request| is_left(request, requester, left);
         if !state.desk.is_empty() {
-            self.desks.leave(&mut state.desk, requester, left);
+            self.desks.leave(&mut state.desk, requester, left, macrostep);
         }
-        state.safe.update(gone, |request| request.tag = (0, 0));
-        state.due.update(|(request, _)| gone(request), |(request, _)| request.tag = (0, 0));
-        state.due.retain(|(request, _)| self.tells_all || is_for_somebody(request));
-        state.telling.update(|(request, _)| gone(request), |(request, _)| request.tag = (0, 0));
-        if self.tells_all && self.members.len() > 1 {
-            state.telling.retain(|(request, _)| is_for_somebody(request));
+        if state.seldom.is_nothing() {
+            return;
         }
-        let requests = state.in_transit.iter_mut().flat_map(|batch| &mut batch.requests);
-        requests.filter(|request| gone(request)).for_each(|request| request.tag = (0, 0));
+        state.change(|seldom| {
+            seldom.safe.update(gone, |request| request.tag = (0, 0));
+            seldom.due.update(|(request, _)| gone(request), |(request, _)| request.tag = (0, 0));
+            seldom.due.retain(|(request, _)| self.tells_all || is_for_somebody(request));
+            seldom.telling.update(|(request, _)| gone(request), |(request, _)| request.tag = (0, 0));
+            if self.tells_all && self.members.len() > 1 {
+                seldom.telling.retain(|(request, _)| is_for_somebody(request));
+            }
+            let requests = seldom.in_transit.iter_mut().flat_map(|batch| &mut batch.requests);
+            requests.filter(|request| gone(request)).for_each(|request| request.tag = (0, 0));
+        });
     }
 
     /// What `batch` does where it comes to the desk.
@@ -91,14 +96,16 @@ impl Product<'_> {
             return one(state);
         }
         let mut states = SmallVec::new();
-        let mut in_transit = std::mem::take(&mut state.in_transit).into_iter();
+        let mut in_transit = state.change(|seldom| std::mem::take(&mut seldom.in_transit)).into_iter();
         let first = in_transit.next().map_or_else(
             || state.clone(),
             |batch| {
                 let coming = self.arrival(&state, &batch);
                 if Self::meddles(&state, &coming) {
                     let in_transit = std::iter::once(batch.clone()).chain(in_transit.clone()).collect();
-                    states.push(ProductState { in_transit, ..state.clone() });
+                    let mut later = state.clone();
+                    later.change(|seldom| seldom.in_transit = in_transit);
+                    states.push(later);
                 }
                 self.take_in(state.clone(), &batch, &coming)
             },
@@ -125,13 +132,15 @@ impl Product<'_> {
     /// A batch comes. More than one state: what it would stop may not have begun, or be over already.
     pub(super) fn arrive(&mut self, mut state: ProductState, batch: &Batch) -> States {
         if !state.in_transit.is_empty() {
-            state.in_transit.push(batch.clone());
+            state.change(|seldom| seldom.in_transit.push(batch.clone()));
             return one(state);
         }
         let coming = self.arrival(&state, batch);
         let mut states = States::new();
         if self.races && Self::meddles(&state, &coming) {
-            states.push(ProductState { in_transit: SharedList::from_iter([batch.clone()]), ..state.clone() });
+            let mut later = state.clone();
+            later.change(|seldom| seldom.in_transit.push(batch.clone()));
+            states.push(later);
             let mut stops = coming.stops.clone();
             stops.retain(|number| !state.is_stopped(*number));
             // What an undo would wait its turn behind, but overtake where it has not begun.
@@ -160,7 +169,9 @@ impl Product<'_> {
                         let those = stops.iter().enumerate().filter(|(at, _)| some & (1 << at.min(&2)) != 0);
                         for (_, number) in those.rev() {
                             self.desks.put_back(&mut waits.desk, *number, last);
-                            waits.placed.retain(|of| of != number);
+                            if waits.placed.contains(number) {
+                                waits.change(|seldom| seldom.placed.retain(|of| of != number));
+                            }
                         }
                         let coming = self.arrival(&waits, batch);
                         states.push(self.take_in(waits, batch, &coming));
@@ -224,21 +235,24 @@ impl Product<'_> {
     /// A safe configuration interrupts what is under way in its (sub)system.
     fn interrupts(&self, state: &mut ProductState, request: Request) {
         let Ask::Apply(safe) = request.ask else { return };
-        for active in state.desk.under_way() {
+        let desk = state.desk.clone();
+        for active in desk.under_way() {
             let reached = self.worlds.claims.interrupts(safe, &active.batch.requests);
             if reached && state.interrupted.iter().all(|of| of.number != active.number) {
                 let (number, given_up) = (active.number, active.given_up.len());
-                state.interrupted.push(Interrupted { number, planned: state.world, given_up });
+                let interrupted = Interrupted { number, planned: state.world, given_up };
+                state.change(|seldom| seldom.interrupted.push(interrupted));
             }
         }
         self.owed(state, &request);
         if let Some(world) = self.worlds.get(state.world).filter(|_| request.scope.is_some() && !state.desk.is_empty())
         {
-            self.desks.change(&mut state.desk, |desk| {
-                world.note_gone(&request, state.safe.iter(), desk.requests_mut());
+            let ProductState { desk, seldom, .. } = &mut *state;
+            self.desks.change(desk, |desk| {
+                world.note_gone(&request, seldom.get().safe.iter(), desk.requests_mut());
             });
         }
-        state.safe.push(request);
+        state.change(|seldom| seldom.safe.push(request));
     }
 
     /// What is under way is given up by its own undo.
@@ -257,9 +271,9 @@ impl Product<'_> {
                 let comes = self.worlds.comes(planned, &self.desks.asks_of(&state.desk, number), &beside);
                 // What was begun as one stays so, whatever of it is answered now.
                 if comes.takes() > 1 && !beside.joined {
-                    state.joined.push(number);
+                    state.change(|seldom| seldom.joined.push(number));
                 }
-                comes.group.places.contains(&place)
+                comes.group.places().any(|of| of == place)
             }
         };
         if !begun {
@@ -271,9 +285,10 @@ impl Product<'_> {
     pub(super) fn cancel_behind(&self, state: &mut ProductState, number: u32, place: usize) {
         let request = state.desk.active(number).and_then(|active| active.batch.requests.get(place)).copied();
         let given = AnsweredPlaces::from_iter([(place, Some(Verdict::Cancelled))]);
-        let gone = self.desks.all_answered(&mut state.desk, number, &given);
+        let given = self.desks.given(given);
+        let answered = self.desks.all_answered(&mut state.desk, number, &given);
         request.into_iter().for_each(|request| self.due(state, request, Verdict::Cancelled));
-        gone.iter().flat_map(|gone| &gone.undone).for_each(|(undo, verdict)| self.due(state, *undo, *verdict));
+        answered.undone.iter().for_each(|(undo, verdict)| self.due(state, *undo, *verdict));
     }
 
     /// An answer is on its way, if anybody waits for it (or all are to be given).
@@ -283,7 +298,7 @@ impl Product<'_> {
             is_for_somebody(&request) && event != EventId::OTHER
         };
         if self.tells_all || self.member(request.requester).is_some_and(listens) {
-            state.due.push((request, verdict));
+            state.change(|seldom| seldom.due.push((request, verdict)));
         }
     }
 
@@ -298,7 +313,8 @@ impl Product<'_> {
 
     /// The next batch that may begin does: its number.
     fn begin_next(&self, state: &mut ProductState) -> Option<u32> {
-        let ProductState { desk, world, leaving, safe, .. } = state;
+        let ProductState { desk, world, leaving, seldom, .. } = state;
+        let safe = &seldom.get().safe;
         let alone = |batch: &Batch| (*leaving && self.worlds.goes_alone(*world, batch)).then_some(LedDown::Whole);
         if desk.waiting().any(|batch| alone(batch).is_some()) || !safe.is_empty() {
             let asked = safe.iter().map(|request| request.ask);
@@ -335,8 +351,10 @@ impl Product<'_> {
                 && let Some(world) = self.worlds.settle_down(state.world)
             {
                 state.world = world;
-                state.unconfirmed.clear();
-                state.lost.clear();
+                state.change(|seldom| {
+                    seldom.unconfirmed.clear();
+                    seldom.lost.clear();
+                });
                 self.review_standings(state);
             }
         }
@@ -345,98 +363,18 @@ impl Product<'_> {
     /// A batch under way begins, or the rest of it: a push takes its place on the stack then, or finds none.
     pub(super) fn takes_place(&mut self, state: &mut ProductState, number: u32) {
         // What is over, however that came, has no place, and its number is another's.
-        let ProductState { placed, joined, desk, .. } = &mut *state;
-        placed.retain(|of| *of != number && desk.active(*of).is_some());
-        joined.retain(|of| desk.active(*of).is_some());
+        if !state.placed.is_empty() || !state.joined.is_empty() {
+            let ProductState { seldom, desk, .. } = &mut *state;
+            seldom.change(|seldom| {
+                seldom.placed.retain(|of| *of != number && desk.active(*of).is_some());
+                seldom.joined.retain(|of| desk.active(*of).is_some());
+            });
+        }
         let Some(active) = state.desk.active(number) else { return };
         if self.worlds.is_tight(state.world, &active.batch.requests)
             && !self.comes(state, number).refused.iter().any(|(_, why)| is_for_room(why))
         {
-            state.placed.push(number);
-        }
-    }
-
-    /// So many events are on their way at once: two for each where there are many coordinators, for one event may be for all of them.
-    fn most_between(&self) -> usize {
-        limits::CHECK_INBOX.max(2 * self.members.len())
-    }
-
-    /// Puts an event into the inbox of everybody but the one that emits it.
-    pub(super) fn spread(&mut self, state: &mut ProductState, name: EventName, but: Option<usize>) {
-        for number in 0..self.members.len() {
-            let member = &mut self.members[number];
-            let event = member.chart.event(name);
-            let own = index(number);
-            // Nothing can bring it elsewhere before it takes the event, and here the event does nothing.
-            let settled = state.outstanding(member.by) == 0 && !state.inbox.iter().any(|(to, _)| *to == own);
-            let alone = but.is_none() && self.members.len() == 1;
-            let member = &mut self.members[number];
-            if Some(number) == but
-                || event == EventId::OTHER
-                || (settled || alone) && !member.react(state.leaves[number], event).taken
-            {
-                continue;
-            }
-            if state.inbox.len() >= self.most_between() {
-                self.overflow = true;
-                continue;
-            }
-            state.inbox.push((own, event));
-        }
-        state.inbox.sort_by_key(|(to, _)| *to);
-    }
-
-    /// Frames that waited for this event have been confirmed; perhaps, where it may be too late and what takes one back waits
-    /// its turn.
-    pub(super) fn confirm(&self, state: &mut ProductState, name: EventName) {
-        if !state.desk.is_empty() && !self.tells_all {
-            return;
-        }
-        state.unconfirmed.retain(|waits| match waits.request.ask {
-            Ask::Apply(id) => {
-                self.worlds.configuration(id).and_then(|c| c.confirm).is_none_or(|confirm| confirm.event != name)
-            }
-            _ => false,
-        });
-    }
-
-    /// Gives answers, one after the other; each is heard before the next comes.
-    pub(super) fn tell(&mut self, mut state: ProductState, answers: Answers, failed: Failed, nexts: &mut Nexts) {
-        self.begin(&mut state);
-        if self.tells_all && self.members.len() > 1 {
-            state.telling.extend(answers.iter().copied());
-            // Each hears it in its own time: what another one asks for meanwhile may come first.
-            state.telling.retain(|(request, _)| is_for_somebody(request));
-            for state in self.lands(state) {
-                let state = self.settle(state);
-                nexts.all.push(Next::answered(Move::Answer, answers.clone(), state, failed));
-            }
-            return;
-        }
-        // Those that are still to be heard lie with the state: who would hear them may be left by hearing those before.
-        state.telling.extend(answers.iter().skip(1).copied());
-        // What is in transit may come between what begins now and what is heard now.
-        let mut states = self.lands(state);
-        for place in 0..answers.len() {
-            let mut heard = States::new();
-            for mut state in states {
-                let (request, verdict) = if place == 0 { answers[0] } else { state.telling.remove(0) };
-                let owner = self.member(request.requester).filter(|_| is_for_somebody(&request));
-                match owner {
-                    Some(number) => {
-                        let event = self.members[number].answer(request.ask, verdict);
-                        nexts.troubles.extend(self.unheard_revert(&state, number, &request, verdict));
-                        heard.extend(self.react(state, number, event));
-                    }
-                    None => heard.push(state),
-                }
-            }
-            states = heard;
-        }
-        for mut state in states {
-            self.begin(&mut state);
-            let state = self.settle(state);
-            nexts.all.push(Next::answered(Move::Answer, answers.clone(), state, failed));
+            state.change(|seldom| seldom.placed.push(number));
         }
     }
 }

@@ -4,7 +4,8 @@
 //! What a simulated component reports after a step (`simulated: { reactions }`) comes once. It is still to come where every way
 //! since that step was quick, or led through places alone that would have heard it.
 
-use super::explore::{Barred, Edge, Graph};
+use super::edges::{Barred, Edge};
+use super::explore::Graph;
 use super::state::Move;
 use crate::model::monitor::is_monitors;
 use crate::model::{EventName, Monitor, RunState, Value};
@@ -24,7 +25,7 @@ impl Graph<'_, '_> {
             let waits = people[edge.from as usize];
             let again =
                 || matches!(self.by(edge), Move::Event(at) if self.product.outside[usize::from(at)] == shutdown);
-            bars.push(match (edge.barred, self.by(edge)) {
+            bars.push(match (edge.barred(), self.by(edge)) {
                 (Some(Barred::Again), _) if waits && again() => None,
                 (Some(Barred::Late), _) if waits => None,
                 (Some(Barred::Gone), Move::Event(at)) => {
@@ -57,7 +58,7 @@ impl Graph<'_, '_> {
         // What was in force before counts for nothing. Each state is judged by its best way.
         let begins = |edge: &&Edge| !self.states[edge.from as usize].stopping && safe(edge.to);
         let open: Vec<u32> = self.edges.iter().filter(begins).map(|edge| edge.to).collect();
-        let best = |edge: &Edge| self.failed[edge.from as usize].max(edge.failed) <= self.failed[edge.to as usize];
+        let best = |edge: &Edge| self.failed[edge.from as usize].max(edge.failed()) <= self.failed[edge.to as usize];
         let before = self.spread_from(open, |_, edge| safe(edge.to) && best(edge));
         (0u32..).zip(before).map(|(at, before)| safe(at) && !before).collect()
     }
@@ -131,7 +132,7 @@ impl Graph<'_, '_> {
             let set_off = |number: usize| self.sets_off(number, reaction);
             let is_it = |edge: &Edge| matches!(self.by(edge), Move::Event(by) if usize::from(by) == at);
             let passes = |(number, edge): &(usize, &Edge)| {
-                !set_off(*number) && (is_it(edge) || !edge.quiet && !hears[edge.from as usize])
+                !set_off(*number) && (is_it(edge) || !edge.quiet() && !hears[edge.from as usize])
             };
             let gone = self.edges.iter().enumerate().filter(passes).map(|(_, edge)| edge.to);
             let gone = self.spread_from(gone.chain([0]).collect(), |number, _| !set_off(number));

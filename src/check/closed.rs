@@ -2,7 +2,7 @@
 //! raises from outside is refused then ([`Deployment::stays_open`](crate::model::Deployment::stays_open)). What components
 //! and monitors report comes all the same, where they have reason to: [`bars`](super::bars).
 
-use super::explore::Barred;
+use super::edges::Barred;
 use super::product::Product;
 use super::reactions::triggers;
 use super::state::{Move, ProductState};

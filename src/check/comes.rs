@@ -1,7 +1,7 @@
 //! What a batch comes to in a world: asked of the stack once, and followed to each end that it may have.
 
 use super::desks::PlainBatch;
-use super::outcome::{Comes, ConcurrentWork, Went, WorldId};
+use super::outcome::{Comes, ConcurrentWork, DecidedGroup, Went, WorldId};
 use super::stands::never;
 use super::world::Worlds;
 use crate::model::{Ask, Findings};
@@ -9,6 +9,7 @@ use crate::plan::PlannedStep;
 use crate::stack::{Ending, Endings, FrameId, Group, Planned, Reason, Request, Rules, Stopped, settle, take_up};
 use crate::transaction::can_fail;
 use smallvec::SmallVec;
+use std::cell::OnceCell;
 use std::rc::Rc;
 use std::sync::Arc;
 
@@ -43,7 +44,6 @@ impl Worlds<'_> {
         });
         let refused = refused.collect();
         let planned = group.planned.take();
-        group.told.iter_mut().for_each(|told| told.reason = None);
         let warnings = planned.as_ref().map(|planned| planned.warnings.clone()).filter(|warnings| !warnings.is_empty());
         let warnings = warnings.map(Rc::new);
         let can_fail = planned.as_ref().map(can_fail).unwrap_or_default();
@@ -69,11 +69,12 @@ impl Worlds<'_> {
         });
         let stopped = stopped.collect();
         let hollow = self.hollow(done.world, &group, planned.as_ref());
-        Comes { group, refused, hollow, warnings, can_fail, done, stopped }
+        let (group, ends) = (DecidedGroup::of(&group), OnceCell::new());
+        Comes { group, refused, hollow, warnings, can_fail, done, stopped, ends }
     }
 
     /// The requests of a group that say what is false in the world in which all of it is done.
-    fn hollow(&self, done: WorldId, group: &Group, planned: Option<&Planned>) -> Vec<(usize, Rc<Findings>)> {
+    fn hollow(&self, done: WorldId, group: &Group, planned: Option<&Planned>) -> Box<[(usize, Rc<Findings>)]> {
         let parts = planned.iter().flat_map(|planned| &planned.parts).enumerate().filter(|(_, part)| part.holds);
         let says = parts.filter_map(|(at, part)| {
             let id = part.pushes.filter(|id| self.judged.contains(id))?;

@@ -4,7 +4,8 @@
 //! it; times that are over may be over at any moment.
 
 use super::automaton::{InterfaceAction, InterfaceAutomaton};
-use super::explore::{Edge, Graph};
+use super::edges::Edge;
+use super::explore::Graph;
 use super::product::Product;
 use super::reactions::triggers;
 use super::shared_list::SharedList;
@@ -106,16 +107,16 @@ impl Deriving<'_, '_, '_> {
             let names = self.brought(by);
             if names.is_empty() {
                 let to = self.at((by.to, told, ending));
-                self.tells(number, by.failed, &tells, to);
+                self.tells(number, by.failed(), &tells, to);
             }
             for name in names {
                 let to = self.at((by.to, self.after(told, name), self.is_ending(ending, name)));
                 if !self.parent.raises.contains(&name) {
-                    self.tells(number, by.failed, &tells, to);
+                    self.tells(number, by.failed(), &tells, to);
                     continue;
                 }
                 taken.insert(name);
-                self.takes(number, name, !by.dropped, &tells, to);
+                self.takes(number, name, !by.dropped(), &tells, to);
             }
         }
         if graph.followed[state as usize] && at.inbox.is_empty() && at.in_transit.is_empty() {

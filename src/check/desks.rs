@@ -4,6 +4,7 @@
 //! out once for it, whatever the system is.
 
 use super::kept::{KeptValue, KeptValues};
+use super::shared_list::SharedList;
 use crate::model::{ConfigId, Verdict};
 use crate::stack::claims::Claims;
 use crate::stack::{Arrival, Arrived, Batch, Desk, Gone, Request, Requester, Why, given_up_of};
@@ -38,6 +39,34 @@ pub struct Coming {
     pub meddles: bool,
 }
 
+/// What it comes to that requests of a batch under way are answered.
+#[derive(Debug)]
+pub struct AnsweredBatch {
+    /// The answers as they are told, with those of undos that had given something of it up.
+    pub answers: SharedList<(Request, Verdict)>,
+    /// Those of these undos alone.
+    pub undone: Box<[(Request, Verdict)]>,
+    /// Undos among the requests that have failed.
+    pub undo_failed: Box<[Request]>,
+}
+
+impl AnsweredBatch {
+    fn of(requests: &[Request], given: &AnsweredPlaces, gone: &[Gone]) -> Self {
+        let (mut answers, mut undo_failed) = (Vec::new(), Vec::new());
+        for ((place, verdict), gone) in given.iter().zip(gone) {
+            let Some(request) = requests.get(*place) else { continue };
+            if *verdict == Some(Verdict::UndoFailed) {
+                undo_failed.push(*request);
+            }
+            let Some(verdict) = *verdict else { continue };
+            answers.push(request.as_told(verdict));
+            answers.extend(gone.undone.iter().copied());
+        }
+        let undone = gone.iter().flat_map(|gone| gone.undone.iter().copied()).collect();
+        Self { answers: answers.into_iter().collect(), undone, undo_failed: undo_failed.into() }
+    }
+}
+
 /// What was worked out of one kind of change, with the desk that comes of it.
 type Worked<K, R> = RefCell<FxHashMap<(KeptDesk, K), (KeptDesk, R)>>;
 
@@ -49,11 +78,12 @@ pub struct Desks {
     of_batches: RefCell<FxHashMap<(KeptDesk, u32), PlainBatch>>,
     comings: RefCell<FxHashMap<Batch, FxHashMap<KeptDesk, Rc<Coming>>>>,
     begins: Worked<(), Option<u32>>,
-    answered: Worked<(u32, AnsweredPlaces), Rc<SmallVec<[Gone; 2]>>>,
+    givens: KeptValues<AnsweredPlaces>,
+    answered: Worked<(u32, KeptValue<AnsweredPlaces>), Rc<AnsweredBatch>>,
     given_up: Worked<(u32, Request), Option<usize>>,
     put_back: Worked<(u32, bool), ()>,
     begun_as: Worked<(KeptDesk, u32, usize), ()>,
-    left: Worked<(Requester, SmallVec<[NodeId; 4]>), ()>,
+    left: Worked<(Requester, u32), ()>,
 }
 
 /// Requests without what means nothing to what they come to.
@@ -158,11 +188,22 @@ impl Desks {
         self.once(&self.begins, desk, (), |desk, ()| desk.begin_next(claims, |_| None, &[]).map(|active| active.number))
     }
 
+    /// Answers, known by a number.
+    pub fn given(&self, given: AnsweredPlaces) -> KeptValue<AnsweredPlaces> {
+        self.givens.keep(given)
+    }
+
     /// [`Desk::all_answered`].
-    pub fn all_answered(&self, desk: &mut KeptDesk, number: u32, given: &AnsweredPlaces) -> Rc<SmallVec<[Gone; 2]>> {
-        let how = (number, given.clone());
-        self.once(&self.answered, desk, how, |desk, (number, given)| {
-            Rc::new(desk.all_answered(number, given.into_iter()))
+    pub fn all_answered(
+        &self,
+        desk: &mut KeptDesk,
+        number: u32,
+        given: &KeptValue<AnsweredPlaces>,
+    ) -> Rc<AnsweredBatch> {
+        self.once(&self.answered, desk, (number, given.clone()), |desk, (number, given)| {
+            let requests = desk.active(number).map(|active| active.batch.requests.clone()).unwrap_or_default();
+            let gone = desk.all_answered(number, given.iter().copied());
+            Rc::new(AnsweredBatch::of(&requests, &given, &gone))
         })
     }
 
@@ -185,9 +226,10 @@ impl Desks {
     }
 
     /// Nobody hears the answers any more whose state has been left by this requester.
-    pub fn leave(&self, desk: &mut KeptDesk, by: Requester, left: &[NodeId]) {
-        self.once(&self.left, desk, (by, SmallVec::from_slice(left)), |desk, (by, left)| {
-            let gone = desk.requests_mut().filter(|request| is_left(request, by, &left));
+    /// `macrostep` is the number of the step in which it has left them: always the same ones.
+    pub fn leave(&self, desk: &mut KeptDesk, by: Requester, left: &[NodeId], macrostep: &u32) {
+        self.once(&self.left, desk, (by, *macrostep), |desk, (by, _)| {
+            let gone = desk.requests_mut().filter(|request| is_left(request, by, left));
             gone.for_each(|request| request.tag = (0, 0));
         });
     }

@@ -5,7 +5,8 @@
 //! comes late: [`late`](super::late).
 
 use super::bound::Bound;
-use super::explore::{Barred, Edge, Graph};
+use super::edges::{Barred, Edge};
+use super::explore::Graph;
 use super::late::Late;
 use super::places::{Leg, Timed, quickest};
 use super::state::{Failed, Move};
@@ -39,7 +40,7 @@ impl Graph<'_, '_> {
             stops(edge.from) && !matches!(bars[*number], Some(Barred::Closed | Barred::Late))
         };
         // That something fails, however soon, is no way on.
-        let fails: Vec<bool> = self.edges.iter().map(|edge| edge.failed != Failed::Nothing).collect();
+        let fails: Vec<bool> = self.edges.iter().map(|edge| edge.failed() != Failed::Nothing).collect();
         let leads = |number: usize| !fails[number] && bars[number].is_none_or(|of| of == Barred::Reported);
         let some: Vec<usize> = self.edges.iter().enumerate().filter(comes).map(|(number, _)| number).collect();
         let timers = self.timers(&some);

@@ -1,7 +1,8 @@
 //! Whether every way leads down, and what it leaves behind.
 
 use super::closed::{fails, still_comes};
-use super::explore::{Barred, Edge, Graph};
+use super::edges::{Barred, Edge};
+use super::explore::Graph;
 use super::judge::Traced;
 use super::members::Member;
 use super::product::Product;
@@ -143,13 +144,17 @@ impl Graph<'_, '_> {
         let begun: Vec<u32> = begun.collect();
         // What came just before is overtaken by the event that ends the deployment, and heard behind it. Where that leads nowhere
         // it is told as unhandled.
-        let heard = self.edges.iter().filter(|edge| !stops(edge.from) && stops(edge.to) && !edge.dropped);
+        let heard = self.edges.iter().filter(|edge| !stops(edge.from) && stops(edge.to) && !edge.dropped());
         let heard = heard.map(|edge| edge.to).collect();
         let stale = self.spread_from(heard, |number, edge| stops(edge.to) && bars[number] == Some(Barred::Closed));
         let stale = (0u32..).zip(stale).filter(|(_, stale)| *stale).map(|(at, _)| at);
         let begun: Vec<u32> = stale.chain(begun).collect();
         let comes = self.spread_from(begun, |number, edge| stops(edge.to) && bars[number] != Some(Barred::Closed));
         for barred in [Barred::Again, Barred::Closed, Barred::Gone, Barred::Late, Barred::Reported] {
+            // Where nothing is barred so, as much leads down as before.
+            if !bars.contains(&Some(barred)) {
+                continue;
+            }
             let after = self.reaching_down(|number, _| bars[number].is_none_or(|of| of > barred));
             let lost = |at: &u32| {
                 let state = &self.states[*at as usize];

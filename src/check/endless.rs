@@ -3,7 +3,8 @@
 //! They are looked for among all such moves at once, so that none is too long to be found.
 
 use super::adjacency::Adjacency;
-use super::explore::{Edge, Graph};
+use super::edges::Edge;
+use super::explore::Graph;
 use super::judge::Traced;
 use super::state::{Failed, Move, Next, ProductState};
 use crate::limits;
@@ -67,7 +68,7 @@ impl Graph<'_, '_> {
     fn round(&mut self, cycle: &[u32]) -> Vec<(ProductState, Next)> {
         let ends: Vec<(u32, u32)> = cycle.iter().copied().zip(cycle.iter().copied().cycle().skip(1)).collect();
         let edge = |(from, to): &(u32, u32)| {
-            let is = |edge: &Edge| edge.quiet && (edge.from, edge.to) == (*from, *to);
+            let is = |edge: &Edge| edge.quiet() && (edge.from, edge.to) == (*from, *to);
             self.edges.iter().position(is).and_then(|number| u32::try_from(number).ok())
         };
         let numbers: Vec<u32> = ends.iter().filter_map(edge).collect();
@@ -87,7 +88,7 @@ impl Graph<'_, '_> {
         let mut hearing: Vec<usize> = Vec::new();
         let on: FxHashSet<(u32, u32)> = cycle.iter().copied().zip(cycle.iter().copied().cycle().skip(1)).collect();
         let on: Vec<Edge> =
-            self.edges.iter().filter(|edge| edge.quiet && on.contains(&(edge.from, edge.to))).copied().collect();
+            self.edges.iter().filter(|edge| edge.quiet() && on.contains(&(edge.from, edge.to))).copied().collect();
         for edge in on {
             let next = edge.place().and_then(|place| self.nexts(edge.from).all.into_iter().nth(place));
             match next.as_ref().map(|next| (next.by, &next.answers)) {
@@ -107,7 +108,7 @@ impl Graph<'_, '_> {
     fn cycles(&self) -> Vec<Vec<u32>> {
         // Where nothing is known it is not known what is answered, so nothing can be said of cycles.
         let known = |at: u32| self.product.worlds.top(self.states[at as usize].world).is_none();
-        let quiet = self.edges.iter().filter(|edge| edge.quiet && known(edge.from) && known(edge.to));
+        let quiet = self.edges.iter().filter(|edge| edge.quiet() && known(edge.from) && known(edge.to));
         let quiet = quiet.map(|edge| (edge.from, edge.to));
         let itself: FxHashSet<u32> = quiet.clone().filter(|(from, to)| from == to).map(|(at, _)| at).collect();
         let quiet = Adjacency::new(self.states.len(), quiet);

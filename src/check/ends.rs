@@ -1,12 +1,14 @@
 //! How what is under way may end.
 
 use super::desks::AnsweredPlaces;
-use super::outcome::{Comes, Went, WorldId};
+use super::kept::KeptValue;
+use super::outcome::{Comes, EndsSo, Went, WorldId};
 use super::product::{Product, as_begun};
-use super::state::{Answers, Failed, Move, Next, Nexts, ProductState, Trouble, Unconfirmed};
+use super::seldom::Unconfirmed;
+use super::state::{Answers, Failed, Move, Next, Nexts, ProductState, Trouble};
 use super::world::Top;
 use crate::model::{Ask, Verdict};
-use crate::stack::{Ending, Request, Requester, Settled, Stopped, Why, settle};
+use crate::stack::{Ending, Endings, Request, Requester, Settled, Stopped, Why, settle};
 use crate::transaction::{Stopping, endings};
 use smallvec::SmallVec;
 use std::cmp::Ordering;
@@ -18,7 +20,7 @@ const SOME_ASIDE: usize = 4;
 struct End<'e> {
     went: &'e Went,
     /// The requests that are answered: place and verdict; none: nobody is told.
-    given: AnsweredPlaces,
+    given: KeptValue<AnsweredPlaces>,
     class: Failed,
 }
 
@@ -28,15 +30,12 @@ fn given(settled: &Settled) -> AnsweredPlaces {
 }
 
 impl Product<'_> {
-    fn requests(state: &ProductState, number: u32) -> SmallVec<[Request; 2]> {
-        state.desk.active(number).map(|active| active.batch.requests.clone()).unwrap_or_default()
-    }
-
     /// How a batch under way may end, or its first requests.
     pub(super) fn ends(&mut self, state: &ProductState, number: u32, nexts: &mut Nexts) {
-        let requests = Self::requests(state, number);
+        let Some(active) = state.desk.active(number) else { return };
+        let requests = &active.batch.requests[..];
         if let Some(top) = self.worlds.top(state.world) {
-            return self.ends_somehow(state, number, top, &requests, nexts);
+            return self.ends_somehow(state, number, top, requests, nexts);
         }
         let comes = self.comes(state, number);
         for (place, reasons) in &comes.refused {
@@ -50,17 +49,28 @@ impl Product<'_> {
             }
         }
         nexts.warnings.extend(comes.warnings.clone());
-        for endings in comes.endings(Stopping::Not, self.tells_all) {
+        let ways = comes.ends.get_or_init(|| self.ways_to_end(requests, &comes)).clone();
+        for EndsSo { endings, given } in ways.iter() {
             let from = nexts.all.len();
-            self.ends_so(state, number, &requests, &comes, &endings, nexts);
+            self.ends_given(state, number, requests, &comes, endings, given.clone(), nexts);
             if state.aside {
-                self.ends_as_aside(state, number, &requests, &comes, &endings, nexts);
+                self.ends_as_aside(state, number, requests, &comes, endings, nexts);
             }
             if endings.iter().all(|ending| *ending == Ending::Done) {
                 let deep = (comes.done.deep, comes.done.left);
                 nexts.all[from..].iter_mut().for_each(|next| next.deep = deep);
             }
         }
+    }
+
+    /// How a batch may end where nothing stops it: always the same where it comes to the same.
+    fn ways_to_end(&self, requests: &[Request], comes: &Comes) -> KeptValue<Vec<EndsSo>> {
+        let group = comes.group.group();
+        let so = |endings: Endings| {
+            let given = self.desks.given(given(&settle(requests, &group, &endings, Stopped::Not)));
+            EndsSo { endings, given }
+        };
+        self.worlds.ends.keep(comes.endings(Stopping::Not, self.tells_all).map(so).collect())
     }
 
     /// The parts of a group under way have ended so, and no safe configuration interrupts them.
@@ -73,7 +83,7 @@ impl Product<'_> {
         endings: &[Ending],
         nexts: &mut Nexts,
     ) {
-        let given = given(&settle(requests, &comes.group, endings, Stopped::Not));
+        let given = self.desks.given(given(&settle(requests, &comes.group.group(), endings, Stopped::Not)));
         self.ends_given(state, number, requests, comes, endings, given, nexts);
     }
 
@@ -88,10 +98,10 @@ impl Product<'_> {
         endings: &[Ending],
         nexts: &mut Nexts,
     ) {
-        let told = given(&settle(requests, &comes.group, endings, Stopped::Not));
-        let of_parts = &comes.group.places;
+        let told = given(&settle(requests, &comes.group.group(), endings, Stopped::Not));
+        let is_part = |place: usize| comes.group.places().any(|of| of == place);
         let found_nothing =
-            told.iter().filter(|(place, verdict)| !of_parts.contains(place) && *verdict == Some(Verdict::Undone));
+            told.iter().filter(|(place, verdict)| !is_part(*place) && *verdict == Some(Verdict::Undone));
         let found_nothing: SmallVec<[usize; 2]> = found_nothing.map(|(place, _)| *place).collect();
         let may = self.may_be_aside(requests, &found_nothing);
         for some in 1..1u32 << may.len().min(SOME_ASIDE) {
@@ -103,13 +113,12 @@ impl Product<'_> {
                 .iter_mut()
                 .filter(|(place, _)| fails(*place))
                 .for_each(|(_, verdict)| *verdict = Some(Verdict::UndoFailed));
-            let from = nexts.all.len();
+            let (from, given) = (nexts.all.len(), self.desks.given(given));
             self.ends_given(state, number, requests, comes, endings, given, nexts);
             nexts.all[from..].iter_mut().for_each(|next| next.failed = next.failed.max(Failed::Undo));
         }
         let done = endings.iter().all(|ending| *ending == Ending::Done);
-        let idle =
-            |part: &usize| !comes.can_fail[*part] && self.may_be_in_the_way(&requests[comes.group.places[*part]]);
+        let idle = |part: &usize| !comes.can_fail[*part] && self.may_be_in_the_way(&requests[comes.group.place(*part)]);
         let idle: SmallVec<[usize; 2]> = (0..comes.can_fail.len()).filter(|part| done && idle(part)).collect();
         for part in idle {
             let of = |at: usize| match at.cmp(&part) {
@@ -131,7 +140,7 @@ impl Product<'_> {
         requests: &[Request],
         comes: &Comes,
         endings: &[Ending],
-        given: AnsweredPlaces,
+        given: KeptValue<AnsweredPlaces>,
         nexts: &mut Nexts,
     ) {
         let Some(went) = comes.went(endings) else { return self.broke(state, number, requests, given, nexts) };
@@ -140,7 +149,7 @@ impl Product<'_> {
             Some(_) => Failed::Apply,
             None => Failed::Nothing,
         };
-        self.ended(state, number, requests, &End { went, given, class }, nexts);
+        self.ended(state, number, &End { went, given, class }, nexts);
     }
 
     /// Nothing is known: each request may end in any way, one after the other.
@@ -148,11 +157,12 @@ impl Product<'_> {
         let ask = requests[0].ask;
         for verdict in [ask.done(), ask.failed(), ask.broken()] {
             let went = Went::to(self.worlds.answered(top, &requests[0], verdict));
-            self.ended(state, number, requests, &End::of_first(&went, Some(verdict)), nexts);
+            self.ended(state, number, &self.first_ends(&went, Some(verdict)), nexts);
         }
         if matches!(requests[0].why, Why::Unconfirmed(..)) {
             // Nobody is told where the frame is gone.
-            self.ended(state, number, requests, &End::of_first(&Went::to(state.world), None), nexts);
+            let went = Went::to(state.world);
+            self.ended(state, number, &self.first_ends(&went, None), nexts);
         }
     }
 
@@ -162,43 +172,32 @@ impl Product<'_> {
         state: &ProductState,
         number: u32,
         requests: &[Request],
-        given: AnsweredPlaces,
+        given: KeptValue<AnsweredPlaces>,
         nexts: &mut Nexts,
     ) {
         let world = self.worlds.broken(state.world, requests.iter().map(|request| request.ask));
         let mut state = state.clone();
         if !self.tells_all {
-            state.unconfirmed.clear();
+            state.waits_for_none();
         }
-        self.ended(&state, number, requests, &End { went: &Went::to(world), given, class: Failed::Broken }, nexts);
+        self.ended(&state, number, &End { went: &Went::to(world), given, class: Failed::Broken }, nexts);
     }
 
     /// These requests of a batch under way are answered, and the world has become another one.
-    fn ended(&mut self, state: &ProductState, number: u32, requests: &[Request], end: &End<'_>, nexts: &mut Nexts) {
+    fn ended(&mut self, state: &ProductState, number: u32, end: &End<'_>, nexts: &mut Nexts) {
         let End { went, given, class } = end;
         let mut next = state.clone();
         self.go(&mut next, went);
-        next.interrupted.retain(|of| of.number != number);
-        next.joined.retain(|of| *of != number);
-        next.placed.retain(|of| *of != number);
-        let gone = self.desks.all_answered(&mut next.desk, number, given);
-        let mut answers = Answers::new();
-        for ((place, verdict), gone) in given.iter().zip(gone.iter()) {
-            let (request, Some(verdict)) = (requests[*place], *verdict) else { continue };
-            self.applied(&mut next, &request, verdict, went);
-            answers.push(request.as_told(verdict));
-            answers.extend(gone.undone.iter().copied());
+        next.forget_batch(number);
+        let answered = self.desks.all_answered(&mut next.desk, number, given);
+        for (request, verdict) in &answered.answers {
+            self.applied(&mut next, request, *verdict, went);
         }
-        let undo_failed = given
-            .iter()
-            .filter(|(_, verdict)| *verdict == Some(Verdict::UndoFailed))
-            .map(|(place, _)| requests[*place]);
-        let undo_failed: SmallVec<[Request; 2]> = undo_failed.collect();
-        if undo_failed.is_empty() {
-            return self.goes_on_behind(next, number, answers, *class, nexts);
+        if answered.undo_failed.is_empty() {
+            return self.goes_on_behind(next, number, &answered.answers, *class, nexts);
         }
-        for next in self.undos_failed(next, &undo_failed) {
-            self.goes_on_behind(next, number, answers.clone(), *class, nexts);
+        for next in self.undos_failed(next, &answered.undo_failed) {
+            self.goes_on_behind(next, number, &answered.answers, *class, nexts);
         }
     }
 
@@ -207,7 +206,7 @@ impl Product<'_> {
         &mut self,
         mut next: ProductState,
         number: u32,
-        answers: Answers,
+        answers: &Answers,
         class: Failed,
         nexts: &mut Nexts,
     ) {
@@ -221,37 +220,39 @@ impl Product<'_> {
         // The rest of it begins before whatever waits.
         self.takes_place(&mut next, number);
         for next in self.lands(next) {
-            self.tell(next, answers.clone(), class, nexts);
+            self.tell(next, answers, class, nexts);
         }
     }
 
     /// What a request that was carried out leaves to be waited for.
     fn applied(&self, state: &mut ProductState, request: &Request, verdict: Verdict, went: &Went) {
         let (Ask::Apply(id), Verdict::Ok) = (request.ask, verdict) else { return };
-        state.lost.retain(|lost| *lost != id);
+        if state.lost.contains(&id) {
+            state.change(|seldom| seldom.lost.retain(|lost| *lost != id));
+        }
         self.stands_for(state, id);
         let waits = self.worlds.configuration(id).is_some_and(|c| c.confirm.is_some());
         // One batch may push several of them.
         let free = |place: u8| state.unconfirmed.iter().all(|waits| waits.place != place);
-        let mut pushed = went.pushed.iter().filter(|(of, place)| *of == id && free(*place));
+        let pushed = went.places.iter().flat_map(|places| &places.pushed);
+        let mut pushed = pushed.filter(|(of, place)| *of == id && free(*place));
         let unknown = (self.tells_all && self.worlds.top(state.world).is_some()).then_some(u8::MAX);
         if let (true, Some(place)) = (waits, pushed.next().map(|(_, place)| *place).or(unknown)) {
             // In which state it was asked for means nothing any more.
             let request = Request { why: Why::Asked, tag: (0, 0), ..*request };
-            state.unconfirmed.push(Unconfirmed { place, request });
+            state.change(|seldom| seldom.unconfirmed.push(Unconfirmed { place, request }));
         }
     }
 
     /// How a batch under way that was stopped may end.
     pub(super) fn stopped_ends(&mut self, state: &ProductState, number: u32, nexts: &mut Nexts) {
-        let requests = Self::requests(state, number);
+        let Some(active) = state.desk.active(number) else { return };
+        let requests = &active.batch.requests[..];
         if requests.is_empty() {
             return;
         }
         // In the order in which they came.
-        let active = state.desk.active(number);
-        let given_up: SmallVec<[usize; 1]> =
-            active.iter().flat_map(|active| &active.given_up).map(|given_up| given_up.place).collect();
+        let given_up: SmallVec<[usize; 1]> = active.given_up.iter().map(|given_up| given_up.place).collect();
         let interrupted = state.interrupted(number);
         let before = interrupted.map_or(given_up.len(), |interrupted| interrupted.given_up.min(given_up.len()));
         let interrupted = interrupted.map(|interrupted| interrupted.planned);
@@ -259,7 +260,7 @@ impl Product<'_> {
             // What came at the same moment may have been told first; and what came when it was on its way back, too late.
             let some = if self.tells_all { 0 } else { before };
             for count in some..=given_up.len() {
-                self.interrupted_ends(state, number, &requests, planned, &given_up[..count], nexts);
+                self.interrupted_ends(state, number, requests, planned, &given_up[..count], nexts);
             }
             return;
         }
@@ -272,12 +273,12 @@ impl Product<'_> {
                     true => Went::to(state.world),
                     false => Went::to(self.worlds.answered(top, &requests[0], verdict)),
                 };
-                self.ended(state, number, &requests, &End::of_first(&went, Some(verdict)), nexts);
+                self.ended(state, number, &self.first_ends(&went, Some(verdict)), nexts);
             }
             return;
         }
         let comes = self.comes(state, number);
-        let first = |given_up: &[usize]| comes.group.places.iter().position(|place| given_up.contains(place));
+        let first = |given_up: &[usize]| comes.group.places().position(|place| given_up.contains(&place));
         // It may be refused by now, or have been; or it was on its way back, or through, when that came.
         if self.tells_all || first(&given_up).is_none() {
             self.ends(state, number, nexts);
@@ -289,7 +290,7 @@ impl Product<'_> {
             let Some(k) = first(&given_up[..count]).filter(|k| !met.contains(k)) else { continue };
             met.push(k);
             for endings in comes.endings(Stopping::GivenUp(k), self.tells_all) {
-                self.ends_so(state, number, &requests, &comes, &endings, nexts);
+                self.ends_so(state, number, requests, &comes, &endings, nexts);
             }
         }
     }
@@ -325,28 +326,31 @@ impl Product<'_> {
     ) {
         let concurrent = as_begun(&state.desk, state, number);
         let comes = self.worlds.comes(planned, &self.desks.asks_of(&state.desk, number), &concurrent);
-        let parts = comes.group.places.iter().enumerate();
+        let parts = comes.group.places().enumerate();
         let given_up: SmallVec<[usize; 2]> =
             parts.filter(|(_, place)| given_up.contains(place)).map(|(part, _)| part).collect();
+        let group = comes.group.group();
         // What was being undone stays; a configuration that is not applied is as if it had not been asked for.
         let undo = (0..comes.can_fail.len()).any(|part| comes.undoes(part, requests));
         let class = if undo { Failed::Undo } else { Failed::Nothing };
         for endings in endings(&comes.can_fail, Stopping::Safe(&given_up), self.tells_all) {
-            let settled = settle(requests, &comes.group, &endings, Stopped::Safe);
+            let settled = settle(requests, &group, &endings, Stopped::Safe);
+            let given = self.desks.given(given(&settled));
             if endings.contains(&Ending::Broken) {
-                self.broke(state, number, requests, given(&settled), nexts);
+                self.broke(state, number, requests, given, nexts);
                 continue;
             }
             let stay = settled.stay.iter().map(|(place, _)| requests[*place]);
             let went = self.worlds.stay(state.world, planned, stay, &[]);
-            self.ended(state, number, requests, &End { went: &went, given: given(&settled), class }, nexts);
+            self.ended(state, number, &End { went: &went, given, class }, nexts);
         }
     }
 
     /// How a safe configuration may end.
     pub(super) fn safe_ends(&mut self, state: &ProductState, at: usize, nexts: &mut Nexts) {
         let mut over = state.clone();
-        let request = &over.safe.remove(at);
+        let request = over.change(|seldom| seldom.safe.remove(at));
+        let request = &request;
         if let Some(top) = self.worlds.top(state.world) {
             for verdict in [Verdict::Ok, Verdict::Broken] {
                 let mut next = over.clone();
@@ -382,7 +386,7 @@ impl Product<'_> {
             let mut next = over;
             next.world = self.worlds.topped(top, std::iter::once(request.ask));
             if !self.tells_all {
-                next.unconfirmed.clear();
+                next.waits_for_none();
             }
             self.safe_told(next, request, Verdict::Broken, Failed::Broken, nexts);
         }
@@ -396,15 +400,14 @@ impl Product<'_> {
         failed: Failed,
         nexts: &mut Nexts,
     ) {
+        let answers = Answers::from_iter([(*request, verdict)]);
         for next in self.lands(next) {
-            self.tell(next, Answers::from_iter([(*request, verdict)]), failed, nexts);
+            self.tell(next, &answers, failed, nexts);
         }
     }
-}
 
-impl<'e> End<'e> {
     /// The first request is answered so.
-    fn of_first(went: &'e Went, verdict: Option<Verdict>) -> Self {
-        Self { went, given: SmallVec::from_iter([(0, verdict)]), class: Failed::Nothing }
+    fn first_ends<'e>(&self, went: &'e Went, verdict: Option<Verdict>) -> End<'e> {
+        End { went, given: self.desks.given(SmallVec::from_iter([(0, verdict)])), class: Failed::Nothing }
     }
 }

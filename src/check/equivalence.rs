@@ -1,7 +1,7 @@
 //! When two systems, or two frames, are the same to whoever may ask for something.
 
 use crate::model::Value;
-use crate::stack::{Frame, shares};
+use crate::stack::{Frame, FrameId, shares};
 use crate::system::{System, View};
 use rustc_hash::{FxHashMap, FxHasher};
 use smallvec::SmallVec;
@@ -18,6 +18,8 @@ pub struct FrameBook {
     frames: Vec<Arc<Frame>>,
     index: FxHashMap<u64, SmallVec<[u32; 1]>>,
     shares: FxHashMap<(u32, u32), bool>,
+    /// Those of which worlds are made, each once.
+    kept: FxHashMap<(FrameNumber, FrameId), Arc<Frame>>,
     /// By address, which is not used again as long as it is known here. What a frame contains goes with the last world that has it.
     known: FxHashMap<usize, (FrameNumber, Weak<Frame>)>,
 }
@@ -43,6 +45,12 @@ impl FrameBook {
         };
         self.known.insert(address, (FrameNumber(number), Arc::downgrade(frame)));
         FrameNumber(number)
+    }
+
+    /// The frame of that number that contains the same, as it was first kept.
+    pub fn keep(&mut self, frame: &Arc<Frame>) -> Arc<Frame> {
+        let number = self.number(frame);
+        self.kept.entry((number, frame.id)).or_insert_with(|| frame.clone()).clone()
     }
 
     /// Whether two frames share anything.

@@ -5,8 +5,10 @@
 
 use super::adjacency::Adjacency;
 use super::bound::Bound;
+use super::chunks::Chunks;
+use super::edges::{Barred, Edge, NOWHERE, Tells};
 use super::effort::{Far, Halt};
-use super::once::Once;
+use super::met::MetStates;
 use super::outcome::WorldId;
 use super::product::Product;
 use super::report::Explored;
@@ -16,70 +18,25 @@ use super::world::Top;
 use crate::limits;
 use crate::model::{Ask, ConfigId, EventName, Findings, Verdict};
 use crate::stack::Requester;
-use indexmap::{IndexMap, IndexSet};
+use indexmap::IndexMap;
 use rustc_hash::{FxBuildHasher, FxHashMap, FxHashSet};
 use std::cell::OnceCell;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::rc::Rc;
 
-/// A move that was followed.
-#[derive(Debug, Clone, Copy)]
-pub struct Edge {
-    /// From where.
-    pub from: u32,
-    /// To where.
-    pub to: u32,
-    /// Its place among the moves from there; [`NOWHERE`]: so many rounds of a cycle.
-    place: u32,
-    /// What leads there, by its number among [`Graph::moves`].
-    by: u32,
-    /// What failed in it.
-    pub failed: Failed,
-    /// No time passes, and no step fails: an answer is given, or heard, or an event is taken.
-    pub quiet: bool,
-    /// What does not come by itself, or not in time, where the deployment is being stopped.
-    pub barred: Option<Barred>,
-    /// It comes, and nobody hears it.
-    pub dropped: bool,
-    /// As far as this move alone tells, a script can bring it about.
-    pub shown: bool,
-}
-
-impl Edge {
-    /// Its place among the moves from there; none: so many rounds of a cycle.
-    pub fn place(&self) -> Option<usize> {
-        (self.place != NOWHERE).then_some(self.place as usize)
-    }
-}
-
-/// Why a way down by a move is none for a deployment that is being stopped.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Barred {
-    /// The event that ends the deployment comes once more, or somebody wants it up again.
-    Again,
-    /// An event that is refused then.
-    Closed,
-    /// An event that only a fault, or what components and monitors need not report there, would bring.
-    Gone,
-    /// A time event that lasts as long as the shutdown may.
-    Late,
-    /// An event that only a component may raise then, if one does.
-    Reported,
-}
-
 /// Everything that was followed.
 pub struct Graph<'p, 'a> {
     /// The product.
     pub product: &'p mut Product<'a>,
     /// The states, in the order they were met.
-    pub states: IndexSet<ProductState, FxBuildHasher>,
+    pub states: MetStates,
     /// The worst that failed on the best way to each.
     pub failed: Vec<Failed>,
     /// Whether each was followed further.
     pub followed: Vec<bool>,
     /// What leads from one to another.
-    pub edges: Vec<Edge>,
+    pub edges: Chunks<Edge>,
     /// The moves that do, and why they lead none down that is being stopped.
     moves: IndexMap<Move, Option<Barred>, FxBuildHasher>,
     /// What is wrong, and where.
@@ -101,7 +58,6 @@ pub struct Graph<'p, 'a> {
     out: OnceCell<Adjacency>,
     into: OnceCell<Adjacency>,
     pub(super) depth: Vec<u32>,
-    once: Once,
     open: BinaryHeap<Reverse<(Failed, u32, u32)>>,
     /// For each class the shortest ways with nothing worse.
     pub(super) ways: FxHashMap<Failed, Ways>,
@@ -114,8 +70,6 @@ pub struct Graph<'p, 'a> {
     /// The cycles of edges that are gone round where an edge is no move.
     pub(super) rounds: FxHashMap<u32, Vec<u32>>,
 }
-
-pub(super) const NOWHERE: u32 = u32::MAX;
 
 /// By which edge each state is come to on the shortest way.
 pub struct Ways {
@@ -136,10 +90,10 @@ impl Ways {
 pub fn explore<'p, 'a>(product: &'p mut Product<'a>) -> Graph<'p, 'a> {
     let mut graph = Graph {
         product,
-        states: IndexSet::default(),
+        states: MetStates::default(),
         failed: Vec::new(),
         followed: Vec::new(),
-        edges: Vec::new(),
+        edges: Chunks::default(),
         moves: IndexMap::default(),
         troubles: Vec::new(),
         warned: Vec::new(),
@@ -152,7 +106,6 @@ pub fn explore<'p, 'a>(product: &'p mut Product<'a>) -> Graph<'p, 'a> {
         out: OnceCell::new(),
         into: OnceCell::new(),
         depth: Vec::new(),
-        once: Once::default(),
         open: BinaryHeap::new(),
         ways: FxHashMap::default(),
         reacts: FxHashMap::default(),
@@ -229,12 +182,8 @@ impl Graph<'_, '_> {
 
     /// The number of a state that is reached with at worst this failing.
     pub(super) fn reach(&mut self, state: ProductState, failed: Failed, depth: u32) -> u32 {
-        let known = self.states.get_index_of(&state);
-        let id = u32::try_from(known.unwrap_or(self.states.len())).unwrap_or(NOWHERE);
-        if known.is_none() {
-            let mut state = state;
-            self.once.share(&mut state);
-            self.states.insert(state);
+        let (id, is_new) = self.states.meet(state);
+        if is_new {
             self.failed.push(failed);
             self.depth.push(depth);
             self.followed.push(false);
@@ -277,7 +226,6 @@ impl Graph<'_, '_> {
         let shows = self.product.shows(&state);
         let mut all = nexts.all;
         for (place, next) in all.drain(..).enumerate() {
-            let place = u32::try_from(place).unwrap_or(NOWHERE);
             if let Some(deep) = next.deep.0 {
                 // Of what was set aside the same may be applied anew without its frame being one more.
                 if !state.aside {
@@ -336,26 +284,27 @@ impl Graph<'_, '_> {
             }
             let by = self.moved(by);
             let barred = self.moves[by as usize].filter(|_| state.stopping);
-            self.edges.push(Edge { from: at, to, place, by, failed: class, quiet, barred, dropped, shown });
+            let tells = Tells { failed: class, quiet, barred, dropped, shown };
+            self.edges.push(Edge::new(at, to, by, Some(place), tells));
         }
         self.product.spare = all;
     }
 
     /// The numbers of the edges from each state, once all were followed.
     pub(super) fn outgoing(&self) -> &Adjacency {
-        let edges = || (0u32..).zip(&self.edges).map(|(number, edge)| (edge.from, number));
+        let edges = || (0u32..).zip(self.edges.iter()).map(|(number, edge)| (edge.from, number));
         self.out.get_or_init(|| Adjacency::new(self.states.len(), edges()))
     }
 
     /// Of those to each state.
     pub(super) fn incoming(&self) -> &Adjacency {
-        let edges = || (0u32..).zip(&self.edges).map(|(number, edge)| (edge.to, number));
+        let edges = || (0u32..).zip(self.edges.iter()).map(|(number, edge)| (edge.to, number));
         self.into.get_or_init(|| Adjacency::new(self.states.len(), edges()))
     }
 
     /// What leads along an edge.
     pub(super) fn by(&self, edge: &Edge) -> Move {
-        self.moves.get_index(edge.by as usize).map_or(Move::Rounds, |(by, _)| *by)
+        self.moves.get_index(edge.by() as usize).map_or(Move::Rounds, |(by, _)| *by)
     }
 
     fn moved(&mut self, by: Move) -> u32 {
@@ -366,8 +315,14 @@ impl Graph<'_, '_> {
 
     /// A cycle is gone round so often that it leads there.
     pub(super) fn rounds_lead(&mut self, from: u32, to: u32, failed: Failed, shown: bool) {
-        let (by, barred) = (self.moved(Move::Rounds), None);
-        self.edges.push(Edge { from, to, place: NOWHERE, by, failed, quiet: false, barred, dropped: false, shown });
+        let by = self.moved(Move::Rounds);
+        self.edges.push(Edge::new(
+            from,
+            to,
+            by,
+            None,
+            Tells { failed, quiet: false, barred: None, dropped: false, shown },
+        ));
     }
 
     /// Whether the step of a reaction is done on an edge, as far as nothing fails.
@@ -382,15 +337,16 @@ impl Graph<'_, '_> {
 
     /// What follows from a state: always the same.
     pub(super) fn nexts(&mut self, at: u32) -> Nexts {
-        let state = self.states[at as usize].clone();
         self.product.minds_elsewhere = self.failed[at as usize] == Failed::Nothing;
-        let nexts = self.nexts_of(at, &state);
+        let nexts = self.nexts_of(at);
         self.product.minds_elsewhere = true;
         nexts
     }
 
-    fn nexts_of(&mut self, at: u32, state: &ProductState) -> Nexts {
-        if !self.is_lean(at) {
+    fn nexts_of(&mut self, at: u32) -> Nexts {
+        let lean = self.is_lean(at);
+        let state = &self.states[at as usize];
+        if !lean {
             return self.product.nexts(state);
         }
         let most = std::mem::replace(&mut self.product.most_waiting, 1);
@@ -414,10 +370,12 @@ impl Graph<'_, '_> {
         self.cut(Bound::ByHand, so_far);
         let top = Top { safe: true, actuator: self.product.worlds.has_actuator(state.world) };
         state.world = self.product.worlds.topped(top, std::iter::empty());
-        state.unconfirmed.clear();
-        // What it interrupts may be over before, or not have begun: all the same where nothing is known.
-        state.safe.retain(|request| request.requester != Requester::Operator);
-        state.in_transit.clear();
+        state.change(|seldom| {
+            seldom.unconfirmed.clear();
+            // What it interrupts may be over before, or not have begun: all the same where nothing is known.
+            seldom.safe.retain(|request| request.requester != Requester::Operator);
+            seldom.in_transit.clear();
+        });
         (state, failed.max(Failed::Undo))
     }
 

@@ -206,7 +206,7 @@ impl Graph<'_, '_> {
         };
         let mut met: FxHashSet<u32> = FxHashSet::default();
         let mut open: VecDeque<u32> = VecDeque::new();
-        for edge in &self.edges {
+        for edge in self.edges.iter() {
             if says(self, edge.from, edge.to) && !ends(self, self.by(edge)) && met.insert(edge.to) {
                 open.push_back(edge.to);
             }

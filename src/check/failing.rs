@@ -4,7 +4,8 @@
 //! Where nobody hears the event that ends it, and nothing is under way any more, a running deployment that was still coming up is
 //! taken back without its coordinators at once: a time, or an event, that would lead on there is not waited for.
 
-use super::explore::{Barred, Edge, Graph};
+use super::edges::{Barred, Edge};
+use super::explore::Graph;
 use super::judge::Traced;
 use super::state::{Failed, Move};
 use crate::model::Finding;
@@ -43,17 +44,17 @@ impl Graph<'_, '_> {
     /// Where it is stopped after a bring-up that has failed, nothing failing any more.
     pub(super) fn behind_failed(&self, comes_up: &[bool]) -> Vec<bool> {
         let failed = self.failed_bring_ups(comes_up);
-        let stops = |_: usize, edge: &Edge| self.states[edge.to as usize].stopping && edge.failed == Failed::Nothing;
+        let stops = |_: usize, edge: &Edge| self.states[edge.to as usize].stopping && edge.failed() == Failed::Nothing;
         self.spread_from(failed, stops)
     }
 
     /// Where it rests, with something left, when it was stopped before it was up and nobody heard that.
     fn rests_unheard(&self, comes_up: &[bool]) -> Vec<u32> {
         let state = |at: u32| &self.states[at as usize];
-        let dropped = self.edges.iter().filter(|edge| edge.dropped && comes_up[edge.from as usize]);
+        let dropped = self.edges.iter().filter(|edge| edge.dropped() && comes_up[edge.from as usize]);
         // The event comes once.
         let goes_on = |_: usize, edge: &Edge| {
-            !state(edge.from).is_at_rest() && state(edge.to).stopping && edge.barred != Some(Barred::Again)
+            !state(edge.from).is_at_rest() && state(edge.to).stopping && edge.barred() != Some(Barred::Again)
         };
         let open = self.spread_from(dropped.map(|edge| edge.to).collect(), goes_on);
         let left = |at: u32| {

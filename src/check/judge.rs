@@ -425,7 +425,7 @@ impl Graph<'_, '_> {
     /// Where nothing leads on.
     fn stuck(&mut self, found: &mut Traced) -> FxHashSet<u32> {
         let mut leads_on = vec![false; self.states.len()];
-        self.edges.iter().filter(|edge| !edge.dropped).for_each(|edge| leads_on[edge.from as usize] = true);
+        self.edges.iter().filter(|edge| !edge.dropped()).for_each(|edge| leads_on[edge.from as usize] = true);
         let troubled = self.troubles.iter().filter(|(_, trouble)| trouble.stays_in_force()).map(|(at, _)| *at);
         let troubled: FxHashSet<u32> = troubled.collect();
         let mut stuck = FxHashSet::default();

@@ -80,7 +80,7 @@ impl<T> Default for KeptValues<T> {
     }
 }
 
-impl<T: Eq + Hash> KeptValues<T> {
+impl<T: Eq + Hash + Clone> KeptValues<T> {
     /// The one that is the same.
     pub fn keep(&self, value: T) -> KeptValue<T> {
         let mut all = self.0.borrow_mut();
@@ -88,7 +88,8 @@ impl<T: Eq + Hash> KeptValues<T> {
             return known.clone();
         }
         let number = u32::try_from(all.len()).unwrap_or(u32::MAX);
-        let kept = KeptValue(Rc::new(Numbered { number, value }));
+        // What has grown has more room than it needs; a copy has not.
+        let kept = KeptValue(Rc::new(Numbered { number, value: value.clone() }));
         all.insert(ByValue(kept.clone()));
         kept
     }

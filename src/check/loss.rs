@@ -20,7 +20,9 @@ impl Product<'_> {
     /// A configuration has been applied: what of it runs now is watched.
     pub(super) fn stands_for(&self, state: &mut ProductState, id: ConfigId) {
         let Some(holds) = self.worlds.configuration(id).and_then(|c| c.holds.as_ref()) else { return };
-        state.over.retain(|over| *over != id);
+        if state.over.contains(&id) {
+            state.change(|seldom| seldom.over.retain(|over| *over != id));
+        }
         state.stands.retain(|(of, _)| *of != id);
         // What else is under way may have started it, or be about to stop it: nobody knows which came first.
         if let Some(world) = self.worlds.get(state.world).filter(|_| state.desk.under_way().is_empty()) {
@@ -34,18 +36,25 @@ impl Product<'_> {
         if state.stands.is_empty() && state.over.is_empty() {
             return;
         }
-        let ProductState { stands, over, world, .. } = state;
+        let ProductState { stands, seldom, world, .. } = state;
         let in_force = |id: ConfigId| self.worlds.is_in_force(*world, id);
-        over.retain(|id| in_force(*id));
+        if !seldom.get().over.is_empty() {
+            seldom.change(|seldom| seldom.over.retain(|id| in_force(*id)));
+        }
         stands.retain(|(id, _)| in_force(*id));
         let Some(world) = self.worlds.get(*world) else { return };
         let of = |id: ConfigId| stands.iter().filter(move |(of, _)| *of == id).map(|(_, name)| *name);
         let down: Vec<ConfigId> =
             stands.iter().map(|(id, _)| *id).filter(|id| is_stood_down(of(*id), &world.system)).collect();
+        if down.is_empty() {
+            return;
+        }
         stands.retain(|(id, _)| !down.contains(id));
-        over.extend(down);
-        over.sort_unstable();
-        over.dedup();
+        seldom.change(|seldom| {
+            seldom.over.extend(down);
+            seldom.over.sort_unstable();
+            seldom.over.dedup();
+        });
     }
 
     /// How a configuration in force is lost, and no other one with it.

@@ -1,8 +1,9 @@
 //! What states of the product are made of, kept once: of a hundred thousand states most have lists that others have as
 //! well, come to on other ways.
 
+use super::seldom::{Interrupted, Seldom, SharedSeldom, Unconfirmed};
 use super::shared_list::SharedList;
-use super::state::{Interrupted, ProductState, Unconfirmed};
+use super::state::ProductState;
 use crate::model::{ComponentName, ConfigId, Verdict};
 use crate::stack::{Batch, Request};
 use crate::statechart::EventId;
@@ -12,6 +13,7 @@ use std::hash::Hash;
 /// All that was met of each kind.
 #[derive(Default)]
 pub(super) struct Once {
+    seldoms: FxHashSet<SharedSeldom>,
     interrupted: FxHashSet<SharedList<Interrupted>>,
     numbers: FxHashSet<SharedList<u32>>,
     requests: FxHashSet<SharedList<Request>>,
@@ -26,21 +28,33 @@ pub(super) struct Once {
 impl Once {
     /// The state, made of what is kept already where it has the same.
     pub fn share(&mut self, state: &mut ProductState) {
-        list(&mut self.interrupted, &mut state.interrupted);
-        for own in [&mut state.joined, &mut state.placed] {
+        list(&mut self.inboxes, &mut state.inbox);
+        list(&mut self.stands, &mut state.stands);
+        if state.seldom.is_nothing() {
+            return;
+        }
+        if let Some(known) = self.seldoms.get(&state.seldom) {
+            state.seldom = known.clone();
+            return;
+        }
+        state.change(|seldom| self.share_lists(seldom));
+        self.seldoms.insert(state.seldom.clone());
+    }
+
+    fn share_lists(&mut self, seldom: &mut Seldom) {
+        list(&mut self.interrupted, &mut seldom.interrupted);
+        for own in [&mut seldom.joined, &mut seldom.placed] {
             list(&mut self.numbers, own);
         }
-        list(&mut self.requests, &mut state.safe);
-        for own in [&mut state.due, &mut state.telling] {
+        list(&mut self.requests, &mut seldom.safe);
+        for own in [&mut seldom.due, &mut seldom.telling] {
             list(&mut self.answers, own);
         }
-        list(&mut self.inboxes, &mut state.inbox);
-        list(&mut self.unconfirmed, &mut state.unconfirmed);
-        for own in [&mut state.lost, &mut state.over] {
+        list(&mut self.unconfirmed, &mut seldom.unconfirmed);
+        for own in [&mut seldom.lost, &mut seldom.over] {
             list(&mut self.configurations, own);
         }
-        list(&mut self.stands, &mut state.stands);
-        list(&mut self.batches, &mut state.in_transit);
+        list(&mut self.batches, &mut seldom.in_transit);
     }
 }
 

@@ -1,9 +1,12 @@
 //! What is said of worlds: where something leads to, and what a batch or a safe configuration comes to in one.
 
+use super::desks::AnsweredPlaces;
+use super::kept::KeptValue;
 use crate::model::{ConfigId, Findings, Verdict};
-use crate::stack::{Ending, Endings, FrameId, Group, LedDown, Request, Requester};
+use crate::stack::{Ending, Endings, FrameId, Group, LedDown, Request, Requester, Told};
 use crate::transaction::{Stopping, endings};
 use smallvec::SmallVec;
+use std::cell::OnceCell;
 use std::rc::Rc;
 
 /// The number of a world.
@@ -12,15 +15,22 @@ pub type WorldId = u32;
 /// The world in which nothing was applied.
 pub const EMPTY: WorldId = 0;
 
+/// Where frames stand that count.
+#[derive(Debug)]
+pub struct FramePlaces {
+    /// Of each that counted before, its place among those that count now.
+    pub of: Vec<Option<u8>>,
+    /// The places of those that were pushed, with the configurations.
+    pub pushed: SmallVec<[(ConfigId, u8); 1]>,
+}
+
 /// Where something leads to.
 #[derive(Debug, Clone)]
 pub struct Went {
     /// The world.
     pub world: WorldId,
-    /// Of each frame that counted before, its place among those that count now; none: nothing was asked about that.
-    pub places: Option<Rc<Vec<Option<u8>>>>,
-    /// The places of the frames that were pushed, with the configurations.
-    pub pushed: SmallVec<[(ConfigId, u8); 1]>,
+    /// Where frames stand then; none: nothing was asked about that.
+    pub places: Option<Rc<FramePlaces>>,
     /// A configuration of which one requester has more than [`limits::CHECK_FRAMES`] frames then.
     pub deep: Option<ConfigId>,
     /// The same with [`limits::CHECK_LEFT`].
@@ -36,7 +46,7 @@ pub type Held = SmallVec<[FrameId; 2]>;
 impl Went {
     /// To a world of which no frames are known.
     pub fn to(world: WorldId) -> Self {
-        Self { world, places: None, pushed: SmallVec::new(), deep: None, left: None }
+        Self { world, places: None, deep: None, left: None }
     }
 }
 
@@ -56,12 +66,12 @@ pub struct ConcurrentWork {
 /// What the first requests of a batch come to.
 #[derive(Debug, Clone)]
 pub struct Comes {
-    /// The first requests as the stack decides, without the plan and the reasons.
-    pub group: Group,
+    /// The first requests as the stack decides.
+    pub group: DecidedGroup,
     /// Those that are told because they are refused.
-    pub refused: Vec<(usize, Rc<Findings>)>,
+    pub refused: Box<[(usize, Rc<Findings>)]>,
     /// Those that can only fail, since what they stand for is false when all is done.
-    pub hollow: Vec<(usize, Rc<Findings>)>,
+    pub hollow: Box<[(usize, Rc<Findings>)]>,
     /// What planning warns of, if of anything.
     pub warnings: Option<Rc<Findings>>,
     /// Of each part of the group, whether something in it can fail.
@@ -69,7 +79,73 @@ pub struct Comes {
     /// When all is done.
     pub done: Went,
     /// Of each part: when it was given up, and when it failed; those before it stand.
-    pub(super) stopped: Vec<(Went, Option<Went>)>,
+    pub(super) stopped: Box<[(Went, Option<Went>)]>,
+    /// How it may end where nothing stops it, once that was asked.
+    pub(super) ends: OnceCell<KeptValue<Vec<EndsSo>>>,
+}
+
+/// One way in which the first requests of a batch may end.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub struct EndsSo {
+    /// How their parts end.
+    pub endings: Endings,
+    /// Who is answered what.
+    pub given: KeptValue<AnsweredPlaces>,
+}
+
+/// What the stack decides of a batch ([`Group`]), without the plan and the reasons, and in little room: there is one for each world in which
+/// the batch was asked for.
+#[derive(Debug, Clone)]
+pub struct DecidedGroup {
+    takes: u32,
+    commits: bool,
+    places: Box<[u32]>,
+    visits: Box<[Option<FrameId>]>,
+    told: Box<[(u32, Option<Verdict>)]>,
+    stay: Box<[(u32, FrameId)]>,
+}
+
+impl DecidedGroup {
+    /// The same as what was decided.
+    pub fn of(group: &Group) -> Self {
+        let place = |place: usize| u32::try_from(place).unwrap_or(u32::MAX);
+        Self {
+            takes: place(group.takes),
+            commits: group.commits,
+            places: group.places.iter().map(|at| place(*at)).collect(),
+            visits: group.visits.iter().copied().collect(),
+            told: group.told.iter().map(|told| (place(told.place), told.verdict)).collect(),
+            stay: group.stay.iter().map(|(at, frame)| (place(*at), *frame)).collect(),
+        }
+    }
+
+    /// As the stack has it, for who settles it.
+    pub fn group(&self) -> Group {
+        let told = |(place, verdict): &(u32, Option<Verdict>)| Told {
+            place: *place as usize,
+            verdict: *verdict,
+            reason: None,
+        };
+        Group {
+            takes: self.takes as usize,
+            commits: self.commits,
+            places: self.places().collect(),
+            visits: self.visits.iter().copied().collect(),
+            told: self.told.iter().map(told).collect(),
+            stay: self.stay.iter().map(|(at, frame)| (*at as usize, *frame)).collect(),
+            ..Group::default()
+        }
+    }
+
+    /// Of each part, the place of its request in the batch.
+    pub fn places(&self) -> impl Iterator<Item = usize> + Clone + '_ {
+        self.places.iter().map(|place| *place as usize)
+    }
+
+    /// The place of the request of a part.
+    pub fn place(&self, part: usize) -> usize {
+        self.places[part] as usize
+    }
 }
 
 impl Comes {
@@ -96,12 +172,12 @@ impl Comes {
 
     /// So many requests are settled then.
     pub fn takes(&self) -> usize {
-        self.group.takes.max(1)
+        (self.group.takes as usize).max(1)
     }
 
     /// Whether a part undoes something.
     pub fn undoes(&self, part: usize, requests: &[Request]) -> bool {
-        requests[self.group.places[part]].ask.is_undo()
+        requests[self.group.place(part)].ask.is_undo()
     }
 }
 

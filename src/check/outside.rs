@@ -9,7 +9,9 @@ use crate::model::{Ask, ConfigId, EventName, RequestId, Verdict};
 use crate::stack::{Batch, FrameId, Request, Requester, Why};
 use crate::statechart::{EdgeId, EventId};
 use smallvec::SmallVec;
-use std::collections::BTreeSet;
+
+/// Events from outside that are heard somewhere, by their places, in order.
+type HeardEvents = SmallVec<[usize; 8]>;
 
 impl Product<'_> {
     /// What comes when nothing lies in the inboxes.
@@ -31,7 +33,7 @@ impl Product<'_> {
             next.world = world;
             (next.stopping, next.elsewhere) = (false, false);
             next.leaving = false;
-            next.unconfirmed.clear();
+            next.waits_for_none();
             self.review_standings(&mut next);
             nexts.all.push(Next::plain(Move::OthersDown, next, Failed::Nothing));
         }
@@ -47,7 +49,7 @@ impl Product<'_> {
             if !next.in_transit.is_empty() {
                 continue;
             }
-            next.safe.retain(|safe| safe.requester != Requester::Safety);
+            next.change(|seldom| seldom.safe.retain(|safe| safe.requester != Requester::Safety));
             next.elsewhere = next.stopping;
             self.begin(&mut next);
             nexts.all.push(Next::plain(Move::Elsewhere(id), self.settle(next), Failed::Apply));
@@ -66,30 +68,42 @@ impl Product<'_> {
         }
         let state = ProductState { across: true, ..state.clone() };
         self.times_come(&state, nexts);
-        self.events_come(&state, self.alike.iter().copied().collect(), nexts);
+        let mut all = HeardEvents::from_slice(&self.alike);
+        all.sort_unstable();
+        all.dedup();
+        self.events_come(&state, all, nexts);
         self.children_tell(&state, nexts);
     }
 
     /// Time passes for each. Answers the events from outside that are heard where they are.
-    fn times_come(&mut self, state: &ProductState, nexts: &mut Nexts) -> BTreeSet<usize> {
-        let mut heard: BTreeSet<usize> = BTreeSet::new();
+    fn times_come(&mut self, state: &ProductState, nexts: &mut Nexts) -> HeardEvents {
+        let mut heard = HeardEvents::new();
         for number in 0..self.members.len() {
-            for event in self.members[number].offers(state.leaves[number]).iter() {
-                let name = self.members[number].name_of(*event);
-                match name.and_then(|name| self.outside.iter().position(|outside| *outside == name)) {
-                    Some(at) => _ = heard.insert(self.alike[at]),
-                    None if state.moved & bit(number) != 0 => {}
-                    None if self.is_busy(state, number) => nexts.cut = true,
-                    None => self.hear(state.clone(), number, *event, Move::Time(index(number), *event), nexts),
+            let member = &mut self.members[number];
+            let offers = self.offers.of(number, member, state.leaves[number], &self.outside, &self.alike);
+            heard.extend_from_slice(&offers.outside);
+            for event in &offers.timed {
+                if state.moved & bit(number) != 0 {
+                    continue;
+                }
+                if self.is_busy(state, number) {
+                    nexts.cut = true;
+                } else {
+                    self.hear(state.clone(), number, *event, Move::Time(index(number), *event), nexts);
                 }
             }
+        }
+        if self.members.len() > 1 {
+            heard.sort_unstable();
+            heard.dedup();
         }
         heard
     }
 
     /// Each of these events comes from outside.
-    fn events_come(&mut self, state: &ProductState, heard: BTreeSet<usize>, nexts: &mut Nexts) {
+    fn events_come(&mut self, state: &ProductState, heard: HeardEvents, nexts: &mut Nexts) {
         let busy: SmallVec<[bool; 4]> = (0..self.members.len()).map(|number| self.is_busy(state, number)).collect();
+        let any_busy = busy.contains(&true);
         for at in heard {
             let name = self.outside[at];
             if self.waits_for_others() && state.stopping && name == self.deployment.deploy.event
@@ -100,7 +114,7 @@ impl Product<'_> {
             }
             let takes =
                 |(number, member): (usize, &mut Member<'_>)| busy[number] && member.takes(state.leaves[number], name);
-            if self.members.iter_mut().enumerate().any(takes) {
+            if any_busy && self.members.iter_mut().enumerate().any(takes) {
                 nexts.cut = true;
                 continue;
             }
@@ -169,7 +183,7 @@ impl Product<'_> {
     }
 
     /// The event that ends the deployment comes where nobody waits for it: it is raised once, and gone.
-    fn unheard_shutdown(&mut self, state: &ProductState, heard: &BTreeSet<usize>, nexts: &mut Nexts) {
+    fn unheard_shutdown(&mut self, state: &ProductState, heard: &HeardEvents, nexts: &mut Nexts) {
         let shutdown = self.deployment.shutdown.event;
         let Some(at) = self.outside.iter().position(|name| *name == shutdown) else { return };
         if heard.contains(&at) || state.stopping || !self.minds_stopping || self.all_in(state, |member| member.down) {
@@ -194,14 +208,15 @@ impl Product<'_> {
         next.stopping &= name != self.deployment.deploy.event;
         next.leaving |= name == self.deployment.shutdown.event && self.minds_operators();
         self.confirm(&mut next, name);
-        self.spread(&mut next, name, None);
+        let hearers = self.hearers(&next, name, None);
         // If one alone hears it, there is nothing to wait for, unless more may come before it does.
-        if let [(only, event)] = next.inbox[..]
+        if let [(only, event)] = hearers[..]
+            && next.inbox.is_empty()
             && !self.crosses
         {
-            next.inbox.clear();
             self.hear(next, usize::from(only), event, by, nexts);
         } else {
+            self.spread_to(&mut next, &hearers);
             nexts.all.push(Next::plain(by, next, Failed::Nothing));
         }
     }
@@ -211,7 +226,7 @@ impl Product<'_> {
         for (at, waits) in state.unconfirmed.iter().enumerate() {
             let Ask::Apply(id) = waits.request.ask else { continue };
             let mut next = state.clone();
-            next.unconfirmed.remove(at);
+            next.change(|seldom| seldom.unconfirmed.remove(at));
             nexts.all.push(Next::plain(Move::Confirmed(id), next, Failed::Nothing));
             self.unconfirmed(state, at, id, nexts);
         }
@@ -225,13 +240,15 @@ impl Product<'_> {
             }
             let event = Verdict::Lost.event(Ask::Apply(id));
             let mut next = state.clone();
-            next.lost.push(id);
-            next.lost.sort_unstable();
+            next.change(|seldom| {
+                seldom.lost.push(id);
+                seldom.lost.sort_unstable();
+            });
             let class = if holds { Failed::Apply } else { Failed::Broken };
             if !holds {
                 // What differs stays as it is until somebody undoes or recovers it.
                 next.world = self.worlds.broken(state.world, std::iter::empty());
-                next.unconfirmed.clear();
+                next.waits_for_none();
             }
             self.spread(&mut next, event, None);
             let by = Move::Lost(id);
@@ -262,7 +279,7 @@ impl Product<'_> {
         let why = Why::Unconfirmed(frame);
         let request = Request { ask: Ask::UndoOf(id), scope: None, why, ..waits.request };
         let mut left = state.clone();
-        left.unconfirmed.remove(at);
+        left.change(|seldom| seldom.unconfirmed.remove(at));
         if self.tells_all {
             // It is a request like others, and takes its time.
             self.desks
@@ -279,19 +296,19 @@ impl Product<'_> {
         let told = |verdict: Verdict| Answers::from_iter([request.as_told(verdict)]);
         if !comes.refused.is_empty() {
             nexts.troubles.extend(comes.refused.iter().map(|(_, why)| Trouble::Refused(request, why.clone())));
-            self.tell(left, told(Verdict::UndoFailed), Failed::Undo, nexts);
+            self.tell(left, &told(Verdict::UndoFailed), Failed::Undo, nexts);
             return;
         }
         if comes.can_fail.contains(&true) {
-            self.tell(left.clone(), told(Verdict::UndoFailed), Failed::Undo, nexts);
+            self.tell(left.clone(), &told(Verdict::UndoFailed), Failed::Undo, nexts);
             let mut broken = left.clone();
-            broken.unconfirmed.clear();
+            broken.waits_for_none();
             broken.world = self.worlds.broken(state.world, std::iter::once(request.ask));
-            self.tell(broken, told(Verdict::UndoBroken), Failed::Broken, nexts);
+            self.tell(broken, &told(Verdict::UndoBroken), Failed::Broken, nexts);
         }
         let mut next = left;
         self.go(&mut next, &comes.done);
-        self.tell(next, told(Verdict::Undone), Failed::Apply, nexts);
+        self.tell(next, &told(Verdict::Undone), Failed::Apply, nexts);
     }
 
     /// What is told to a coordinator that nobody asked for, and that it does not hear where it is: unless it asks itself for

@@ -1,7 +1,8 @@
 //! What there is between the beginning of stopping and its end: states, with what is waited for there, and what leads from one to the
 //! next.
 
-use super::explore::{Barred, Graph};
+use super::edges::Barred;
+use super::explore::Graph;
 use super::state::{Failed, Move, Next};
 use super::timers::{Timer, Timers, Wait, Waits, aged, comes_behind, takes};
 use crate::limits;
@@ -62,7 +63,7 @@ impl Graph<'_, '_> {
             let edge = &self.edges[*number];
             if let Move::Time(number_of, event) = self.by(edge) {
                 timers.insert(*number, Timers::from_iter([Timer::Time(usize::from(number_of), event)]));
-            } else if let (Move::Event(at), Some(Barred::Gone)) = (self.by(edge), edge.barred) {
+            } else if let (Move::Event(at), Some(Barred::Gone)) = (self.by(edge), edge.barred()) {
                 let raises = |name: EventName| self.product.alike_to(at).any(|alike| alike == name);
                 let of = self.product.delayed().filter(|(_, reaction)| raises(reaction.raise));
                 let of: Timers = of.map(|(reaction, _)| Timer::Reports(reaction)).collect();

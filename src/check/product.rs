@@ -18,9 +18,11 @@ use super::derived::ParentInterface;
 use super::desks::{Desks, PlainBatch};
 use super::effort::{Effort, Left};
 use super::members::{Member, hears_loss, members};
+use super::offers::AllOffers;
 use super::outcome::{Comes, ConcurrentWork, EMPTY, Held, Went, WorldId};
+use super::seldom::{SharedSeldom, Unconfirmed};
 use super::shared_list::SharedList;
-use super::state::{Failed, Move, Next, Nexts, ProductState, Reacts, Unconfirmed, bit, index, one};
+use super::state::{Failed, Move, Next, Nexts, ProductState, Reacts, bit, index, one};
 use super::world::Worlds;
 use crate::limits;
 use crate::model::{Catalogue, ConfigId, Deployment, EventName, Precedence, Verdict};
@@ -103,6 +105,8 @@ pub struct Product<'a> {
     pub(super) effort: Left<'a>,
     /// What is known of reactions to steps.
     pub(super) reacts: FxHashMap<(WorldId, PlainBatch, ConcurrentWork), Reacts>,
+    /// What coordinators hear in each leaf.
+    pub(super) offers: AllOffers,
     /// Room for what follows, used again and again.
     pub(super) spare: Vec<Next>,
 }
@@ -160,6 +164,7 @@ impl<'a> Product<'a> {
             parent: None,
             effort: Effort::default().into(),
             reacts: FxHashMap::default(),
+            offers: AllOffers::default(),
             spare: Vec::new(),
         };
         (product.worlds.judged, product.unjudged) = super::stands::judged(deployment, catalogue, charts);
@@ -197,29 +202,19 @@ impl<'a> Product<'a> {
             leaves: entered.iter().map(|reaction| reaction.leaf).collect(),
             world: EMPTY,
             desk: self.desks.empty(),
-            interrupted: SharedList::new(),
-            joined: SharedList::new(),
-            placed: SharedList::new(),
-            safe: SharedList::new(),
-            due: SharedList::new(),
-            telling: SharedList::new(),
-            stayed: false,
             inbox: SharedList::new(),
-            unconfirmed: SharedList::new(),
-            lost: SharedList::new(),
             stands: SharedList::new(),
-            over: SharedList::new(),
+            seldom: SharedSeldom::default(),
+            stayed: false,
             aside: false,
-            down: 0,
             stopping: false,
             leaving: false,
             elsewhere: false,
-            children: 0,
             beliefs: SharedList::new(),
             told: SharedList::new(),
-            moved: 0,
             across: false,
-            in_transit: SharedList::new(),
+            down: 0,
+            children: 0,
         };
         let mut states = one(state);
         for (by, reaction) in entered.iter().enumerate() {
@@ -267,7 +262,7 @@ impl<'a> Product<'a> {
             let mine = |(request, _): &(Request, Verdict)| self.member(request.requester) == Some(number);
             if let Some(at) = state.telling.iter().position(mine) {
                 let mut next = state.clone();
-                let (request, verdict) = next.telling.remove(at);
+                let (request, verdict) = next.change(|seldom| seldom.telling.remove(at));
                 let event = self.members[number].answer(request.ask, verdict);
                 self.hear(next, number, event, Move::Taken(own, event), &mut nexts);
                 let urgent = self.takes_next(state, number).into_iter().filter(|takes| takes.urgent);
@@ -284,9 +279,10 @@ impl<'a> Product<'a> {
     fn answers_come(&mut self, state: &ProductState, nexts: &mut Nexts) {
         if let Some((request, verdict)) = state.due.first().copied() {
             let mut next = state.clone();
-            next.due.remove(0);
+            next.change(|seldom| seldom.due.remove(0));
+            let answers = SharedList::from_iter([(request, verdict)]);
             for next in self.lands(next) {
-                self.tell(next, SmallVec::from_iter([(request, verdict)]), Failed::Nothing, nexts);
+                self.tell(next, &answers, Failed::Nothing, nexts);
             }
         }
         // Those that have nothing to do with each other end in any order.
@@ -332,7 +328,10 @@ impl<'a> Product<'a> {
         state.stopping &= self.waits_for_others() || !(state.is_at_rest() && self.all_in(&state, |member| member.down));
         state.elsewhere &= state.stopping;
         if state.inbox.is_empty() {
-            (state.moved, state.across) = (0, false);
+            state.across = false;
+            if state.moved != 0 {
+                state.change(|seldom| seldom.moved = 0);
+            }
         }
         state
     }
@@ -347,7 +346,7 @@ impl<'a> Product<'a> {
             self.desks.change(&mut state.desk, |desk| {
                 for request in desk.requests_mut() {
                     if let Why::Unconfirmed(frame) = request.why {
-                        let place = self.worlds.place(from, frame).and_then(|at| places.get(at).copied().flatten());
+                        let place = self.worlds.place(from, frame).and_then(|at| places.of.get(at).copied().flatten());
                         let frame = place.and_then(|place| self.worlds.frame(went.world, place));
                         request.why = Why::Unconfirmed(frame.unwrap_or(FrameId(0)));
                     }
@@ -355,10 +354,11 @@ impl<'a> Product<'a> {
             });
         }
         if let Some(places) = went.places.as_ref().filter(|_| !state.unconfirmed.is_empty()) {
-            let place = |waits: &Unconfirmed| places.get(usize::from(waits.place)).copied().flatten();
+            let place = |waits: &Unconfirmed| places.of.get(usize::from(waits.place)).copied().flatten();
             let there =
                 state.unconfirmed.iter().filter_map(|waits| Some(Unconfirmed { place: place(waits)?, ..*waits }));
-            state.unconfirmed = there.collect();
+            let there = there.collect();
+            state.change(|seldom| seldom.unconfirmed = there);
         }
         self.review_standings(state);
     }

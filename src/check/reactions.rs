@@ -26,7 +26,12 @@ pub struct Macrostep {
     pub left: Vec<NodeId>,
     /// Names that were raised and ask for nothing, in order.
     pub emitted: Vec<EventName>,
+    /// Its number among those of the same coordinator.
+    pub number: u32,
 }
+
+/// The number of the first entry.
+const FIRST_ENTRY: u32 = u32::MAX;
 
 /// The table.
 pub struct Reactions<'a> {
@@ -83,7 +88,7 @@ impl<'a> Reactions<'a> {
         // Where it begins in *down* it has come there: it is down until it asks for something.
         let mut hook = self.watch(None);
         machine.run(self.chart, Time::default(), &mut hook);
-        machine.leaf().map(|leaf| hook.reaction(leaf))
+        machine.leaf().map(|leaf| hook.reaction(leaf, FIRST_ENTRY))
     }
 
     /// What happens in `leaf` when `event` comes.
@@ -96,7 +101,8 @@ impl<'a> Reactions<'a> {
         machine.place(self.chart, leaf, Time::default());
         machine.send(event);
         machine.run(self.chart, Time::default(), &mut hook);
-        let reaction = Rc::new(hook.reaction(machine.leaf().unwrap_or(leaf)));
+        let number = u32::try_from(self.table.len()).unwrap_or(FIRST_ENTRY);
+        let reaction = Rc::new(hook.reaction(machine.leaf().unwrap_or(leaf), number));
         self.machine = machine;
         self.table.insert((leaf, event), reaction.clone());
         reaction
@@ -157,9 +163,9 @@ struct MacrostepRecorder<'a> {
 }
 
 impl MacrostepRecorder<'_> {
-    fn reaction(self, leaf: NodeId) -> Macrostep {
+    fn reaction(self, leaf: NodeId, number: u32) -> Macrostep {
         let Self { taken, handed, left, emitted, .. } = self;
-        Macrostep { leaf, taken, handed, left, emitted }
+        Macrostep { leaf, taken, handed, left, emitted, number }
     }
 }
 

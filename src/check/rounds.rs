@@ -6,7 +6,8 @@
 
 use super::adjacency::Adjacency;
 use super::bound::Bound;
-use super::explore::{Edge, Graph, NOWHERE};
+use super::edges::{Edge, NOWHERE};
+use super::explore::Graph;
 use super::outcome::EMPTY;
 use super::state::Failed;
 use crate::limits;
@@ -89,19 +90,20 @@ impl Graph<'_, '_> {
     fn cyclic(&self) -> Cycles {
         let fits = |edge: &Edge| {
             // Where nothing is left, frames are forgotten: they do not pile up.
-            edge.failed <= Failed::Apply && edge.place().is_some() && self.states[edge.to as usize].world != EMPTY
+            edge.failed() <= Failed::Apply && edge.place().is_some() && self.states[edge.to as usize].world != EMPTY
         };
         let all = self.edges.iter().filter(|edge| fits(edge)).map(|edge| (edge.from, edge.to));
         let of = Adjacency::new(self.states.len(), all).components();
         let on_one = |edge: &Edge| fits(edge) && of[edge.from as usize] == of[edge.to as usize];
-        let edges = (0u32..).zip(&self.edges).filter(|(_, edge)| on_one(edge));
+        let edges = (0u32..).zip(self.edges.iter()).filter(|(_, edge)| on_one(edge));
         let edges = Adjacency::new(self.states.len(), edges.map(|(number, edge)| (edge.from, number)));
         Cycles { edges, of }
     }
 
     /// The edges of a cycle that ends with this one, on which nothing fails that is worse.
     fn cycle(&self, edge: u32, cycles: &Cycles, worst: Failed) -> Option<Vec<u32>> {
-        let Edge { from: goal, to: start, failed, .. } = self.edges[edge as usize];
+        let last = self.edges[edge as usize];
+        let (goal, start, failed) = (last.from, last.to, last.failed());
         if failed > worst || self.failed[start as usize] > worst {
             return None;
         }
@@ -120,7 +122,8 @@ impl Graph<'_, '_> {
                 return Some(cycle);
             }
             for number in cycles.edges.of(at) {
-                let Edge { to, failed, .. } = self.edges[*number as usize];
+                let edge = self.edges[*number as usize];
+                let (to, failed) = (edge.to, edge.failed());
                 if failed <= worst && to != start && !by.contains_key(&to) {
                     by.insert(to, *number);
                     queue.push_back(to);
@@ -174,12 +177,12 @@ impl Graph<'_, '_> {
             return true;
         }
         state.world = world;
-        state.unconfirmed.clear();
+        state.waits_for_none();
         let (failed, depth) = (self.failed[at as usize].max(worst), self.depth[at as usize] + 1);
         let to = self.reach(state, failed, depth);
         let number = u32::try_from(self.edges.len()).unwrap_or(NOWHERE);
         self.rounds.insert(number, cycle.to_vec());
-        let shown = cycle.iter().all(|edge| self.edges[*edge as usize].shown);
+        let shown = cycle.iter().all(|edge| self.edges[*edge as usize].shown());
         self.rounds_lead(at, to, worst, shown);
         true
     }

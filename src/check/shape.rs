@@ -1,11 +1,13 @@
 //! Which frames of a stack count, and in what order: what makes two stacks one for whoever asks.
 
 use super::equivalence::{FrameBook, FrameNumber};
+use crate::limits;
 use crate::model::ConfigId;
 use crate::stack::{Frame, FrameId, Requester, Stack, calls, is_kept, staying};
 use crate::system::Slot;
 use rustc_hash::{FxHashMap, FxHashSet};
 use smallvec::SmallVec;
+use std::rc::Rc;
 use std::sync::Arc;
 
 /// A frame that counts: its content, and the number of what frames that do not count do to it.
@@ -48,6 +50,28 @@ pub struct Shapes {
     beneath: FxHashMap<Beneath, u32>,
     /// Of a frame (its content) among the frames that do not count, so many of which lie below it.
     under: FxHashMap<(FrameNumber, SmallVec<[FrameNumber; 4]>, usize), u32>,
+    /// Of stacks that were met, by what their frames contain.
+    known: FxHashMap<SmallVec<[FrameNumber; 8]>, Rc<StackShape>>,
+}
+
+/// What of a stack counts: always the same for frames that contain the same.
+#[derive(Debug)]
+pub struct StackShape {
+    /// The frames that count, in a canonical order.
+    pub counted: Box<[Counted]>,
+    /// Their places on the stack.
+    places: Box<[u16]>,
+    /// A configuration of which one requester has more than [`limits::CHECK_FRAMES`] frames.
+    pub deep: Option<ConfigId>,
+    /// The same with [`limits::CHECK_LEFT`].
+    pub left: Option<ConfigId>,
+}
+
+impl StackShape {
+    /// The numbers of the frames that count, on a stack of this shape.
+    pub fn ids<'s>(&'s self, stack: &'s Stack) -> impl Iterator<Item = FrameId> + 's {
+        self.places.iter().map(|place| stack.frames()[usize::from(*place)].id)
+    }
 }
 
 /// In which orders frames of one requester were met, by their configurations: the lower one first.
@@ -154,8 +178,24 @@ impl Shapes {
         Self { undone, ..Self::default() }
     }
 
-    /// The frames that count, in a canonical order.
-    pub fn of(&mut self, stack: &Stack) -> (Vec<Counted>, Vec<FrameId>) {
+    /// What of a stack counts.
+    pub fn of(&mut self, stack: &Stack) -> Rc<StackShape> {
+        let numbers: SmallVec<[FrameNumber; 8]> =
+            stack.frames().iter().map(|frame| self.frames.number(frame)).collect();
+        if let Some(known) = self.known.get(&numbers) {
+            return known.clone();
+        }
+        let shape = Rc::new(self.work_out(stack));
+        self.known.insert(numbers, shape.clone());
+        shape
+    }
+
+    /// The stack is made of frames that are kept already where they are the same.
+    pub fn share(&mut self, stack: &mut Stack) {
+        stack.share(|frame| self.frames.keep(frame));
+    }
+
+    fn work_out(&mut self, stack: &Stack) -> StackShape {
         let frames = stack.frames();
         let counts: Vec<bool> = frames.iter().map(|frame| self.undone.counts(frame)).collect();
         self.orders.note(frames, &counts);
@@ -189,7 +229,7 @@ impl Shapes {
         let filling =
             |a: &Frame, b: &Frame| a.requester == b.requester && !stack.has_room(a.requester, of(a.requester));
         let mut counted = Vec::with_capacity(kept.len());
-        let mut ids = Vec::with_capacity(kept.len());
+        let mut places = Vec::with_capacity(kept.len());
         while !kept.is_empty() {
             // Of those that could as well lie at the bottom, that with the least name.
             let mut least = 0;
@@ -206,9 +246,35 @@ impl Shapes {
                 self.orders.taken_as.insert(frame.configuration, below.configuration);
             }
             counted.push(one);
-            ids.push(frame.id);
+            let place = frames.iter().position(|other| Arc::ptr_eq(other, frame)).unwrap_or_default();
+            places.push(u16::try_from(place).unwrap_or(u16::MAX));
         }
-        (counted, ids)
+        let [deep, left] = self.more_than([limits::CHECK_FRAMES, limits::CHECK_LEFT], stack);
+        StackShape { counted: counted.into(), places: places.into(), deep, left }
+    }
+
+    /// Of each of these bounds, a configuration of which one requester has more frames than that. Those of another one come of
+    /// other rounds.
+    fn more_than(&self, most: [usize; 2], stack: &Stack) -> [Option<ConfigId>; 2] {
+        let mut counts: SmallVec<[((ConfigId, Requester), usize); 16]> = SmallVec::new();
+        let mut deep = [None; 2];
+        for frame in stack.frames().iter().filter(|frame| self.undone.counts(frame) && !frame.is_squashed()) {
+            let key = (frame.configuration, frame.requester);
+            let count = match counts.iter_mut().find(|(of, _)| *of == key) {
+                Some((_, count)) => {
+                    *count += 1;
+                    *count
+                }
+                None => {
+                    counts.push((key, 1));
+                    1
+                }
+            };
+            for (deep, most) in deep.iter_mut().zip(most) {
+                *deep = deep.or((count > most).then_some(frame.configuration));
+            }
+        }
+        deep
     }
 
     /// Whether stacks were taken for one in which frames of one requester lie in different orders. Which of them are squashed, and

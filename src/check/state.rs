@@ -2,12 +2,14 @@
 
 use super::desks::KeptDesk;
 use super::outcome::WorldId;
+use super::seldom::{Interrupted, Seldom, SharedSeldom};
 use super::shared_list::SharedList;
 use crate::model::codes::{STACK_EMPTY, STACK_NO_FRAME};
 use crate::model::{Ask, ComponentName, ConfigId, EventName, Findings, Verdict};
 use crate::stack::{Batch, Request, Requester, Why};
 use crate::statechart::{EventId, NodeId};
 use smallvec::SmallVec;
+use std::ops::Deref;
 use std::rc::Rc;
 
 /// The worst that failed on a way.
@@ -24,26 +26,6 @@ pub enum Failed {
     Broken,
 }
 
-/// A batch under way that a safe configuration has interrupted.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct Interrupted {
-    /// The number of the batch.
-    pub number: u32,
-    /// The world in which it was planned.
-    pub planned: WorldId,
-    /// So many undos had given something of it up before.
-    pub given_up: usize,
-}
-
-/// A frame that waits for its confirmation.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct Unconfirmed {
-    /// Its place among the frames that count.
-    pub place: u8,
-    /// The request that pushed it.
-    pub request: Request,
-}
-
 /// A state of the product.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct ProductState {
@@ -53,35 +35,16 @@ pub struct ProductState {
     pub world: WorldId,
     /// What waits and what is under way.
     pub desk: KeptDesk,
-    /// Batches under way that are interrupted.
-    pub interrupted: SharedList<Interrupted>,
-    /// Batches under way that were begun as one, of which some requests were answered since.
-    pub joined: SharedList<u32>,
-    /// Batches under way whose pushes found their place only where frames can be squashed: what others hold on to since does
-    /// not take it away.
-    pub placed: SharedList<u32>,
-    /// Safe configurations that are being applied, in their order.
-    pub safe: SharedList<Request>,
-    /// Answers on their way.
-    pub due: SharedList<(Request, Verdict)>,
-    /// Answers that are given and not heard yet; where coordinators hear them at once, none in a state between moves.
-    pub telling: SharedList<(Request, Verdict)>,
-    /// An undo that waited was cancelled by a safe configuration, and its frame stays; false in a state between moves.
-    pub stayed: bool,
     /// Events on their way to a coordinator, those of one in order.
     pub inbox: SharedList<(u8, EventId)>,
-    /// Frames that wait for their confirmation.
-    pub unconfirmed: SharedList<Unconfirmed>,
-    /// Configurations that were lost, and are not applied anew.
-    pub lost: SharedList<ConfigId>,
     /// Components that ran when something in force was applied, and that what it stands for looks at.
     pub stands: SharedList<(ConfigId, ComponentName)>,
-    /// Configurations in force of which one of those was stopped since: what they stand for is watched no more.
-    pub over: SharedList<ConfigId>,
+    /// What few states have.
+    pub seldom: SharedSeldom,
+    /// An undo that waited was cancelled by a safe configuration, and its frame stays; false in a state between moves.
+    pub stayed: bool,
     /// Frames whose undo has failed were set aside: they may be there ([`undo_failed`](super::undo_failed)).
     pub aside: bool,
-    /// Coordinators that have come to *down* and asked for nothing since, by their bits.
-    pub down: u64,
     /// The event that ends the deployment has come, and it is not down yet. Kept only where it makes a difference.
     pub stopping: bool,
     /// The same as the configurator knows it: until all coordinators have come to *down*. Kept only where an operator may have
@@ -89,18 +52,25 @@ pub struct ProductState {
     pub leaving: bool,
     /// A safe configuration of those who have nothing to do with these has come since it is being stopped, and is in force.
     pub elsewhere: bool,
+    /// An event came while some had not heard yet what came before.
+    pub across: bool,
+    /// Coordinators that have come to *down* and asked for nothing since, by their bits.
+    pub down: u64,
     /// How its subsystems stand, as far as their parent can know ([`promises`](super::promises)).
     pub children: u64,
     /// What is known of each of them ([`belief`](super::belief)); of those that are not here, what is known at the start.
     pub beliefs: SharedList<u32>,
     /// What was told its parent since the last move, and what was raised for a subsystem in vain; empty in a state between moves.
     pub told: SharedList<EventName>,
-    /// Coordinators that have moved since the inboxes were empty, by their bits. Kept only where events come meanwhile.
-    pub moved: u64,
-    /// One came meanwhile.
-    pub across: bool,
-    /// Batches on their way, the first of which would stop what is under way: what it would stop ends before.
-    pub in_transit: SharedList<Batch>,
+}
+
+impl Deref for ProductState {
+    type Target = Seldom;
+
+    /// What few states have is read as what all have.
+    fn deref(&self) -> &Seldom {
+        self.seldom.get()
+    }
 }
 
 impl ProductState {
@@ -151,12 +121,40 @@ impl ProductState {
 
     /// Whether nothing waits to be answered or heard.
     pub fn is_at_rest(&self) -> bool {
+        let seldom = &**self;
         self.desk.is_empty()
-            && self.safe.is_empty()
-            && self.due.is_empty()
-            && self.telling.is_empty()
             && self.inbox.is_empty()
-            && self.in_transit.is_empty()
+            && seldom.safe.is_empty()
+            && seldom.due.is_empty()
+            && seldom.telling.is_empty()
+            && seldom.in_transit.is_empty()
+    }
+
+    /// Lets something change what few states have.
+    pub fn change<R>(&mut self, with: impl FnOnce(&mut Seldom) -> R) -> R {
+        self.seldom.change(with)
+    }
+
+    /// Nothing waits for its confirmation any more.
+    pub fn waits_for_none(&mut self) {
+        if !self.unconfirmed.is_empty() {
+            self.change(|seldom| seldom.unconfirmed.clear());
+        }
+    }
+
+    /// A batch is no longer under way, or begins anew: how it was stopped means nothing any more.
+    pub fn forget_batch(&mut self, number: u32) {
+        let of = |seldom: &Seldom| {
+            let interrupted = seldom.interrupted.iter().any(|of| of.number == number);
+            interrupted || seldom.joined.contains(&number) || seldom.placed.contains(&number)
+        };
+        if !self.seldom.is_nothing() && of(self) {
+            self.change(|seldom| {
+                seldom.interrupted.retain(|of| of.number != number);
+                seldom.joined.retain(|of| *of != number);
+                seldom.placed.retain(|of| *of != number);
+            });
+        }
     }
 }
 
@@ -190,7 +188,7 @@ pub enum Move {
 }
 
 /// The answers that a move gives.
-pub type Answers = SmallVec<[(Request, Verdict); 1]>;
+pub type Answers = SharedList<(Request, Verdict)>;
 
 /// Reactions of the simulated platform, by their places among them.
 pub type Reacts = SmallVec<[u16; 2]>;

@@ -1,6 +1,7 @@
 //! The ways to what is found: the shortest one that a script can go, as far as each of its moves tells; else the shortest.
 
-use super::explore::{Edge, Graph, NOWHERE, Ways};
+use super::edges::{Edge, NOWHERE};
+use super::explore::{Graph, Ways};
 use super::product::Product;
 use super::state::{Failed, Move, Next, ProductState};
 use super::trace::{Again, Happened, MoveReplay, TraceStep};
@@ -142,8 +143,8 @@ impl Graph<'_, '_> {
         if self.ways.contains_key(&class) {
             return;
         }
-        let shown = self.search(|edge| edge.failed <= class && edge.shown);
-        let all = self.search(|edge| edge.failed <= class);
+        let shown = self.search(|edge| edge.failed() <= class && edge.shown());
+        let all = self.search(|edge| edge.failed() <= class);
         self.ways.insert(class, Ways { shown, all });
     }
 

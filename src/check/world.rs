@@ -8,15 +8,15 @@
 //! After *broken* nothing is known any more: that is a world of its own ([`Top`]).
 
 use super::desks::PlainBatch;
-use super::outcome::{Comes, ConcurrentWork, Held, SafeComes, Went, Whose, WorldId};
-use super::shape::{Counted, Shapes, Undone};
+use super::kept::KeptValues;
+use super::outcome::{Comes, ConcurrentWork, EndsSo, Held, SafeComes, Went, Whose, WorldId};
+use super::shape::{Shapes, StackShape, Undone};
 use super::systems::{SystemId, Systems};
-use crate::limits;
 use crate::model::{Ask, Catalogue, ConfigId, Configuration, Deployment, RequestId};
 use crate::plan::{PlanContext, Refusal, plan};
 use crate::stack::claims::Claims;
 use crate::stack::{BestEffort, FrameId, Reason, Request, Requester, Rules, SafeEnd, Stack, World, effort, take_up};
-use crate::system::{System, View, step};
+use crate::system::{System, step};
 use crate::time::Time;
 use rustc_hash::{FxHashMap, FxHashSet, FxHasher};
 use smallvec::SmallVec;
@@ -34,23 +34,26 @@ pub struct Top {
     pub actuator: bool,
 }
 
-enum Knowledge {
+/// What is known of a world.
+pub(super) enum Knowledge {
     Exact(Box<Exact>),
     Top(Top),
 }
 
-struct Exact {
-    world: World,
-    system: SystemId,
+/// A world that is known.
+pub(super) struct Exact {
+    pub world: World,
+    pub system: SystemId,
     /// A safe configuration is in force.
-    safe: bool,
+    pub safe: bool,
     /// There is an actuator.
-    actuator: bool,
+    pub actuator: bool,
     /// Frames have been squashed.
-    piled_up: bool,
-    counted: Vec<Counted>,
-    /// The numbers of the counted frames.
-    ids: Vec<FrameId>,
+    pub piled_up: bool,
+    /// Those of its frames that count.
+    pub shape: Rc<StackShape>,
+    /// Their numbers.
+    pub ids: Box<[FrameId]>,
 }
 
 /// All worlds that were met.
@@ -61,14 +64,16 @@ pub struct Worlds<'a> {
     /// What requests may touch, by their text.
     pub claims: Claims,
     context: PlanContext,
-    shapes: Shapes,
+    pub(super) shapes: Shapes,
     /// Places of frames are wanted: there are configurations that must be confirmed.
-    confirms: bool,
-    worlds: Vec<Knowledge>,
-    index: FxHashMap<u64, SmallVec<[WorldId; 1]>>,
+    pub(super) confirms: bool,
+    pub(super) worlds: Vec<Knowledge>,
+    pub(super) index: FxHashMap<u64, SmallVec<[WorldId; 1]>>,
     pub(super) systems: Systems,
     pub(super) comes: FxHashMap<(WorldId, PlainBatch, ConcurrentWork), Rc<Comes>>,
     safes: FxHashMap<(WorldId, Request, Held), Rc<SafeComes>>,
+    /// How batches may end: many may so in many worlds.
+    pub(super) ends: KeptValues<Vec<EndsSo>>,
     pub(super) helds: FxHashMap<(WorldId, PlainBatch, ConcurrentWork), Held>,
     pub(super) withouts: FxHashMap<(WorldId, SmallVec<[Whose; 2]>), Option<Went>>,
     pub(super) asked: FxHashSet<ConfigId>,
@@ -97,6 +102,7 @@ impl<'a> Worlds<'a> {
             systems: Systems::default(),
             comes: FxHashMap::default(),
             safes: FxHashMap::default(),
+            ends: KeptValues::default(),
             helds: FxHashMap::default(),
             withouts: FxHashMap::default(),
             asked: FxHashSet::default(),
@@ -328,78 +334,7 @@ impl<'a> Worlds<'a> {
         self.shapes.mixes_orders()
     }
 
-    fn next(&self) -> WorldId {
+    pub(super) fn next(&self) -> WorldId {
         WorldId::try_from(self.worlds.len()).unwrap_or(WorldId::MAX)
-    }
-
-    /// Where it leads that a world has become another one, whose system has that number.
-    pub(super) fn went(&mut self, from: WorldId, world: World, system: SystemId, pushed: &[FrameId]) -> Went {
-        let [deep, left] = self.more_than([limits::CHECK_FRAMES, limits::CHECK_LEFT], &world);
-        if !self.confirms {
-            return Went { world: self.intern(world, system), places: None, pushed: SmallVec::new(), deep, left };
-        }
-        let (counted, ids) = self.shapes.of(&world.stack);
-        let place = |id: &FrameId| ids.iter().position(|other| other == id).and_then(|at| u8::try_from(at).ok());
-        let before = self.ids(from).to_vec();
-        let places = before.iter().map(place).collect();
-        let of = |id: &FrameId| world.stack.frame(*id).map(|frame| frame.configuration);
-        let pushed = pushed.iter().filter_map(|id| Some((of(id)?, place(id)?))).collect();
-        let world = self.intern_shaped(world, system, counted, ids);
-        Went { world, places: Some(Rc::new(places)), pushed, deep, left }
-    }
-
-    /// Of each of these bounds, a configuration of which one requester has more frames than that. Those of another one come of
-    /// other rounds.
-    fn more_than(&self, most: [usize; 2], world: &World) -> [Option<ConfigId>; 2] {
-        let mut counts: SmallVec<[((ConfigId, Requester), usize); 16]> = SmallVec::new();
-        let mut deep = [None; 2];
-        let frames = world.stack.frames().iter();
-        for frame in frames.filter(|frame| self.shapes.undone.counts(frame) && !frame.is_squashed()) {
-            let key = (frame.configuration, frame.requester);
-            let count = match counts.iter_mut().find(|(of, _)| *of == key) {
-                Some((_, count)) => {
-                    *count += 1;
-                    *count
-                }
-                None => {
-                    counts.push((key, 1));
-                    1
-                }
-            };
-            for (deep, most) in deep.iter_mut().zip(most) {
-                *deep = deep.or((count > most).then_some(frame.configuration));
-            }
-        }
-        deep
-    }
-
-    fn intern(&mut self, world: World, system: SystemId) -> WorldId {
-        let (counted, ids) = self.shapes.of(&world.stack);
-        self.intern_shaped(world, system, counted, ids)
-    }
-
-    fn intern_shaped(&mut self, world: World, system: SystemId, counted: Vec<Counted>, ids: Vec<FrameId>) -> WorldId {
-        let mut hasher = FxHasher::default();
-        (system, &counted).hash(&mut hasher);
-        let same = |id: &&WorldId| match &self.worlds[**id as usize] {
-            Knowledge::Exact(exact) => {
-                let same = exact.counted == counted && (!self.shapes.undone.in_order || exact.ids == ids);
-                same && exact.system == system
-            }
-            Knowledge::Top(_) => false,
-        };
-        let hash = hasher.finish();
-        if let Some(id) = self.index.get(&hash).and_then(|ids| ids.iter().find(same)) {
-            return *id;
-        }
-        let id = self.next();
-        let safe = world.stack.safe().next().is_some();
-        let piled_up = world.stack.frames().iter().any(|frame| frame.is_squashed());
-        let mut actuator = false;
-        world.system.for_each_component(&mut |node| actuator |= node.ty.actuator);
-        let exact = Exact { world, system, safe, actuator, piled_up, counted, ids };
-        self.worlds.push(Knowledge::Exact(Box::new(exact)));
-        self.index.entry(hash).or_default().push(id);
-        id
     }
 }
