@@ -109,6 +109,10 @@ fn without(frame: &Frame, gone: &dyn Fn(ComponentName) -> bool) -> Frame {
         gone(a) || gone(b)
     };
     let of_gone = |step: &Step| components(step).into_iter().any(gone);
+    // A call is void with the component that it was for, and with the one that would take it back.
+    let is_void = |item: &DraftStep| {
+        of_gone(&item.step) || item.takes_back_call().is_some_and(|call| gone(call.operation.component))
+    };
     let (mut kept, mut lost) = (FxHashSet::default(), FxHashSet::default());
     for touch in &frame.footprint.touches {
         if let Slot::Link(_, to) = touch.slot {
@@ -124,10 +128,12 @@ fn without(frame: &Frame, gone: &dyn Fn(ComponentName) -> bool) -> Frame {
             let (done, saved) = rest(frame, &|planned| !of_gone(&planned.step));
             let floor = crate::plan::irreversible(&done).map(str::to_owned);
             let saved: Vec<_> = saved.into_iter().filter(|saved| !either(saved.slot)).collect();
-            (crate::plan::undo::items(&done, &saved), saved, floor)
+            let mut left = crate::plan::undo::items(&done, &saved);
+            left.retain(|item| !is_void(item));
+            (left, saved, floor)
         }
         Inverse::List(items) => {
-            let left: Vec<DraftStep> = items.iter().filter(|item| !of_gone(&item.step)).cloned().collect();
+            let left: Vec<DraftStep> = items.iter().filter(|item| !is_void(item)).cloned().collect();
             (left, frame.saved.clone(), frame.floor.clone())
         }
     };

@@ -132,6 +132,14 @@ impl Beside {
                 change.kind,
                 ChangeKind::Create { .. } | ChangeKind::Destroy { .. } | ChangeKind::Replace { .. }
             );
+            // Where a call of one is taken back by one of another, that is void with either.
+            let elsewhere = |call: &Call, undo: &Option<Call>| {
+                undo.as_ref()
+                    .is_some_and(|undo| is_in(undo.operation.component, "s") != is_in(call.operation.component, "s"))
+            };
+            if matches!(&change.kind, ChangeKind::OperationCall { call, undo } if elsewhere(call, undo)) {
+                return false;
+            }
             // What connects components of one subsystem is its own matter.
             let across = match change.kind {
                 ChangeKind::Connect { from, to, .. } | ChangeKind::Disconnect { from, to } => {

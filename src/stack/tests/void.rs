@@ -120,3 +120,25 @@ fn what_was_done_to_one_is_not_undone_on_the_one_before_it() {
     let (steps, _) = bench.ok(&[Op::Undo(tuned)]);
     assert_eq!(steps, ["property_set t/A.gain = 0.0"]);
 }
+
+/// A call that another subsystem would take back is void with either of the two.
+#[test]
+fn a_call_is_void_with_what_would_take_it_back() {
+    for (of, undo) in [("s/A.open", "t/A.close"), ("t/A.open", "s/A.close")] {
+        for bound in [2, 8] {
+            let (mut bench, [s, _]) = two(bound);
+            for n in 0..3 {
+                let call = |operation: &str| Call { operation: member(operation), args: vec![] };
+                let kind = ChangeKind::OperationCall { call: call(of), undo: Some(call(undo)) };
+                let both = conf(&format!("both{n}"), None, &[], vec![kind, set("t/A.gain", f64::from(n))], &[]);
+                bench.ok(&[by(&both, "root")]);
+            }
+            bench.ok(&[Op::Undo(s)]);
+            while bench.stack.len() > 1 {
+                let (steps, _) = bench.ok(&[Op::UndoTop]);
+                assert!(steps.iter().all(|step| step.starts_with("property_set t/A.gain")), "{steps:?}");
+            }
+            assert!(bench.value("t/A.gain").abs() < 1e-9);
+        }
+    }
+}
