@@ -53,6 +53,11 @@ pub enum Happened {
         /// Its name.
         event: String,
     },
+    /// A subsystem tells an event where nobody waits for it: it is gone.
+    Unheard {
+        /// Its name.
+        event: String,
+    },
     /// Time passes for a coordinator.
     Time {
         /// The coordinator.
@@ -184,6 +189,7 @@ impl fmt::Display for TraceStep {
         match &self.what {
             Happened::Start => f.write_str("start")?,
             Happened::Event { event } => f.write_str(event)?,
+            Happened::Unheard { event } => write!(f, "{event}, for nobody")?,
             Happened::Time { coordinator, event } | Happened::Heard { coordinator, event } => match self.states.len() {
                 1 => f.write_str(event)?,
                 _ => write!(f, "{coordinator} hears {event}")?,
