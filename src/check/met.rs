@@ -120,6 +120,8 @@ mod tests {
                 across: false,
                 down: 0,
                 children: 0,
+                beliefs: SharedList::new(),
+                told: SharedList::new(),
             };
             state.change(|seldom| seldom.joined.extend(0..lost));
             state
@@ -129,9 +131,9 @@ mod tests {
         for (number, state) in (0u32..).zip(&all) {
             assert_eq!(met.meet(state.clone()), (number, true));
         }
-        for (number, state) in (0u32..).zip(&all).rev() {
-            assert_eq!(met.meet(state.clone()), (number, false));
-            assert!(met[number as usize] == *state);
+        for (number, state) in all.iter().enumerate().rev() {
+            assert_eq!(met.meet(state.clone()), (u32::try_from(number).unwrap(), false));
+            assert!(met[number] == *state);
         }
         assert!(met.len() == all.len() && met.iter().eq(&all));
     }
