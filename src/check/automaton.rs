@@ -7,13 +7,14 @@ use super::state::Failed;
 use crate::model::EventName;
 use petgraph::algo::kosaraju_scc;
 use petgraph::graph::{DiGraph, NodeIndex};
-use std::collections::{BTreeMap, BTreeSet};
+use rustc_hash::{FxBuildHasher, FxHashMap};
+use std::hash::BuildHasher;
 
 /// What leads from one state of an interface automaton to another.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum InterfaceAction {
-    /// Nothing that the parent can see, and what fails in it.
-    Silent(Failed),
+    /// Nothing that the parent can see.
+    Silent,
     /// It takes an event of its parent up; heeded: a transition takes it, or may.
     Takes {
         /// By its name there.
@@ -21,27 +22,40 @@ pub enum InterfaceAction {
         /// See there.
         heeded: bool,
     },
-    /// It tells its parent an event.
-    Tells(EventName),
+    /// It tells its parent an event; what has failed in it since it was begun, at worst.
+    Tells(EventName, Failed),
 }
 
 /// What leads on from a state.
 type InterfaceEdges = Vec<(InterfaceAction, u32)>;
+
+/// A state of an interface automaton by itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
+pub struct InterfaceState {
+    /// It is down, and nobody has begun it since.
+    pub down: bool,
+    /// Something has failed since it was begun.
+    pub failed: bool,
+}
 
 /// An interface automaton. Events have the names of the subsystem's own file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InterfaceAutomaton {
     /// What leads on from each state.
     edges: Vec<InterfaceEdges>,
-    /// In which of them it is down, and nobody has begun it since.
-    down: Vec<bool>,
+    /// What is known of each by itself.
+    states: Vec<InterfaceState>,
     start: u32,
 }
 
 impl InterfaceAutomaton {
-    /// The automaton of these states, as small as it becomes. `edges` have the states as numbers, `down` is of each.
-    pub fn new(edges: impl IntoIterator<Item = (u32, InterfaceAction, u32)>, down: Vec<bool>, start: u32) -> Self {
-        let mut whole = Self { edges: vec![Vec::new(); down.len()], down, start };
+    /// The automaton of these states, as small as it becomes. `edges` have the states as numbers.
+    pub fn new(
+        edges: impl IntoIterator<Item = (u32, InterfaceAction, u32)>,
+        states: Vec<InterfaceState>,
+        start: u32,
+    ) -> Self {
+        let mut whole = Self { edges: vec![Vec::new(); states.len()], states, start };
         for (from, by, to) in edges {
             whole.edges[from as usize].push((by, to));
         }
@@ -56,9 +70,9 @@ impl InterfaceAutomaton {
         &self.edges[at as usize]
     }
 
-    /// Whether it is down in a state, and nobody has begun it since.
-    pub fn is_down(&self, at: u32) -> bool {
-        self.down[at as usize]
+    /// What is known of a state by itself.
+    pub fn state(&self, at: u32) -> InterfaceState {
+        self.states[at as usize]
     }
 
     /// Where it starts.
@@ -71,14 +85,14 @@ impl InterfaceAutomaton {
         self.edges.len()
     }
 
-    /// Of each state the number of those that it leads to and that lead back, all silently and without anything failing.
+    /// Of each state the number of those that it leads to and that lead back, all silently.
     fn silent_rounds(&self) -> Vec<u32> {
         let mut graph: DiGraph<(), (), u32> = DiGraph::with_capacity(self.len(), self.len());
         for _ in &self.edges {
             graph.add_node(());
         }
         for (from, edges) in self.edges.iter().enumerate() {
-            let silent = edges.iter().filter(|(by, _)| *by == InterfaceAction::Silent(Failed::Nothing));
+            let silent = edges.iter().filter(|(by, _)| *by == InterfaceAction::Silent);
             for (_, to) in silent {
                 graph.add_edge(NodeIndex::new(from), NodeIndex::new(*to as usize), ());
             }
@@ -93,10 +107,10 @@ impl InterfaceAutomaton {
     /// Of each state the number of the one that it becomes silently, where it can do nothing else.
     fn passed_through(&self) -> Vec<u32> {
         let next = |at: u32| match self.edges[at as usize][..] {
-            [(InterfaceAction::Silent(Failed::Nothing), to)] if self.is_down(at) == self.is_down(to) => Some(to),
+            [(InterfaceAction::Silent, to)] if self.state(at) == self.state(to) => Some(to),
             _ => None,
         };
-        let mut names: BTreeMap<u32, u32> = BTreeMap::new();
+        let mut names: FxHashMap<u32, u32> = FxHashMap::default();
         let mut of = Vec::with_capacity(self.len());
         for at in (0u32..).take(self.len()) {
             // There are no rounds of such steps any more.
@@ -118,18 +132,21 @@ impl InterfaceAutomaton {
         for (from, edges) in (0u32..).zip(&self.edges) {
             edges.iter().for_each(|(_, to)| before[*to as usize].push(from));
         }
-        let mut of: Vec<u32> = self.down.iter().map(|down| u32::from(*down)).collect();
+        let block = |state: &InterfaceState| u32::from(state.down) + 2 * u32::from(state.failed);
+        let mut of: Vec<u32> = self.states.iter().map(block).collect();
         // Of each block how many are in it, and what those of it do that need not be looked at.
-        let mut sizes = vec![0_usize; 2];
+        let mut sizes = vec![0_usize; 4];
         of.iter().for_each(|block| sizes[*block as usize] += 1);
-        let mut does: Vec<Option<InterfaceEdges>> = vec![None; 2];
-        let mut dirty: BTreeSet<u32> = (0u32..).zip(&of).map(|(at, _)| at).collect();
+        let mut does: Vec<Option<u64>> = vec![None; 4];
+        let mut dirty: Vec<u32> = (0u32..).zip(&of).map(|(at, _)| at).collect();
         while !dirty.is_empty() {
-            let mut groups: BTreeMap<(u32, InterfaceEdges), Vec<u32>> = BTreeMap::new();
-            let mut looked_at: BTreeMap<u32, usize> = BTreeMap::new();
+            let mut groups: FxHashMap<(u32, u64), Vec<u32>> = FxHashMap::default();
+            let mut looked_at: FxHashMap<u32, usize> = FxHashMap::default();
             for at in std::mem::take(&mut dirty) {
                 let block = of[at as usize];
-                groups.entry((block, self.seen_as(at as usize, &of))).or_default().push(at);
+                // That two of so many numbers are the same by chance makes one state of two, which may do more then, and never less.
+                let seen = FxBuildHasher.hash_one(self.seen_as(at as usize, &of));
+                groups.entry((block, seen)).or_default().push(at);
                 *looked_at.entry(block).or_default() += 1;
             }
             // Where all of a block was looked at, the first of its groups keeps the name.
@@ -138,14 +155,12 @@ impl InterfaceAutomaton {
                     does[block as usize] = None;
                 }
             }
+            let mut groups: Vec<_> = groups.into_iter().collect();
+            groups.sort_unstable_by_key(|(_, states)| states[0]);
             for ((block, seen), states) in groups {
-                match &does[block as usize] {
-                    Some(known) if *known == seen => continue,
-                    Some(_) => {}
-                    None => {
-                        does[block as usize] = Some(seen);
-                        continue;
-                    }
+                let known = does[block as usize].get_or_insert(seen);
+                if *known == seen {
+                    continue;
                 }
                 let new = u32::try_from(sizes.len()).unwrap_or(u32::MAX);
                 sizes.push(states.len());
@@ -154,10 +169,12 @@ impl InterfaceAutomaton {
                 for at in states {
                     of[at as usize] = new;
                     // A silent step to the rest of the block is one that counts from now on.
-                    dirty.insert(at);
+                    dirty.push(at);
                     dirty.extend(before[at as usize].iter().copied());
                 }
             }
+            dirty.sort_unstable();
+            dirty.dedup();
         }
         of
     }
@@ -166,7 +183,7 @@ impl InterfaceAutomaton {
     fn seen_as(&self, at: usize, of: &[u32]) -> InterfaceEdges {
         let told = self.edges[at].iter().map(|(by, to)| (*by, of[*to as usize]));
         let mut does: InterfaceEdges =
-            told.filter(|(by, to)| !matches!(by, InterfaceAction::Silent(_)) || *to != of[at]).collect();
+            told.filter(|(by, to)| *by != InterfaceAction::Silent || *to != of[at]).collect();
         does.sort_unstable();
         does.dedup();
         does
@@ -175,17 +192,19 @@ impl InterfaceAutomaton {
     /// The same with the states of one number as one.
     fn merged(&self, of: &[u32]) -> Self {
         let len = of.iter().max().map_or(0, |most| *most as usize + 1);
-        let (mut edges, mut down) = (vec![InterfaceEdges::new(); len], vec![true; len]);
+        let mut edges = vec![InterfaceEdges::new(); len];
+        let mut states = vec![InterfaceState { down: true, failed: true }; len];
         for at in 0..self.len() {
             let into = of[at] as usize;
             edges[into].extend(self.seen_as(at, of));
-            down[into] &= self.down[at];
+            states[into].down &= self.states[at].down;
+            states[into].failed &= self.states[at].failed;
         }
         for edges in &mut edges {
             edges.sort_unstable();
             edges.dedup();
         }
-        Self { edges, down, start: of[self.start as usize] }
+        Self { edges, states, start: of[self.start as usize] }
     }
 }
 
@@ -193,7 +212,15 @@ impl InterfaceAutomaton {
 mod tests {
     use super::*;
 
-    const WELL: InterfaceAction = InterfaceAction::Silent(Failed::Nothing);
+    const WELL: InterfaceAction = InterfaceAction::Silent;
+
+    fn tells(event: &str) -> InterfaceAction {
+        InterfaceAction::Tells(name(event), Failed::Nothing)
+    }
+
+    fn plain(states: usize) -> Vec<InterfaceState> {
+        vec![InterfaceState::default(); states]
+    }
 
     fn name(text: &str) -> EventName {
         EventName::new(text).unwrap()
@@ -202,23 +229,24 @@ mod tests {
     #[test]
     fn states_that_show_the_same_are_one_and_no_others() {
         // Two ways of a hundred steps; at the end of one of them something is told.
-        let chain = |by: InterfaceAction, tells: Option<&str>| {
-            let mut edges = vec![(0, by, 1), (0, by, 101), (100, InterfaceAction::Tells(name("up")), 201)];
-            edges.extend((1..100).chain(101..200).map(|at| (at, by, at + 1)));
-            edges.extend(tells.map(|event| (201, InterfaceAction::Tells(name(event)), 0)));
-            InterfaceAutomaton::new(edges, vec![false; 202], 0).len()
+        let chain = |last: Option<&str>| {
+            let mut edges = vec![(0, WELL, 1), (0, WELL, 101), (100, tells("up"), 201)];
+            edges.extend((1..100).chain(101..200).map(|at| (at, WELL, at + 1)));
+            edges.extend(last.map(|event| (201, tells(event), 0)));
+            InterfaceAutomaton::new(edges, plain(202), 0).len()
         };
         // The start, what tells, and what leads nowhere.
-        assert_eq!(chain(WELL, None), 3);
-        assert_eq!(chain(WELL, Some("down")), 4);
-        // Where something fails in each step they differ, by what has failed before.
-        assert_eq!(chain(InterfaceAction::Silent(Failed::Apply), None), 102);
+        assert_eq!(chain(None), 3);
+        assert_eq!(chain(Some("down")), 4);
+        // In two places at once it is one: what it may do is told apart by what has to be told first.
+        let ring = (0..100).flat_map(|at| [(at, WELL, (at + 1) % 100), (at, tells("up"), 100)]);
+        assert_eq!(InterfaceAutomaton::new(ring, plain(101), 0).len(), 2);
     }
 
     #[test]
     fn silent_rounds_are_one_state() {
-        let edges = [(0, WELL, 1), (1, WELL, 2), (2, WELL, 0), (1, InterfaceAction::Tells(name("up")), 3)];
-        let whole = InterfaceAutomaton::new(edges, vec![false; 4], 0);
+        let edges = [(0, WELL, 1), (1, WELL, 2), (2, WELL, 0), (1, tells("up"), 3)];
+        let whole = InterfaceAutomaton::new(edges, plain(4), 0);
         assert_eq!((whole.len(), whole.leads(whole.start()).len()), (2, 1), "{whole:?}");
     }
 }

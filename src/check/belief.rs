@@ -9,10 +9,9 @@ use super::automaton::{InterfaceAction, InterfaceAutomaton};
 use super::state::Failed;
 use crate::model::{EventName, Precedence, precedence::taken_first};
 use indexmap::IndexSet;
-use rustc_hash::{FxBuildHasher, FxHashMap};
+use rustc_hash::{FxBuildHasher, FxHashMap, FxHashSet};
 use smallvec::SmallVec;
-use std::cmp::Reverse;
-use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
+use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 use std::sync::Arc;
 
@@ -26,8 +25,8 @@ type Possible = (u32, [u8; MOST_UNTAKEN]);
 /// nothing more is told.
 pub type MayTell = Rc<[(EventName, Failed, u32)]>;
 
-/// What may be, each with what must have failed since something was told, at least.
-type Belief = Rc<[(Possible, Failed)]>;
+/// What may be.
+type Belief = Rc<[Possible]>;
 
 /// What may be known of a subsystem. Known things are numbers from 0 (the start) on.
 #[derive(Debug, Clone)]
@@ -51,7 +50,7 @@ impl Beliefs {
         let start = automaton.start();
         let (sets, tells, raised) = (IndexSet::default(), FxHashMap::default(), FxHashMap::default());
         let mut beliefs = Self { automaton, heard, takes, sets, tells, raised };
-        beliefs.of([((start, [0; MOST_UNTAKEN]), Failed::Nothing)]);
+        beliefs.of([(start, [0; MOST_UNTAKEN])]);
         beliefs
     }
 
@@ -60,13 +59,13 @@ impl Beliefs {
         if let Some(known) = self.tells.get(&belief) {
             return known.clone();
         }
-        let mut after: BTreeMap<(EventName, Failed), Vec<(Possible, Failed)>> = BTreeMap::new();
-        for ((state, untaken), failed) in self.sets[belief as usize].iter() {
+        let mut after: BTreeMap<(EventName, Failed), Vec<Possible>> = BTreeMap::new();
+        for (state, untaken) in self.sets[belief as usize].iter() {
             for (by, to) in self.automaton.leads(*state) {
-                if let InterfaceAction::Tells(event) = by
+                if let InterfaceAction::Tells(event, failed) = by
                     && self.heard.contains(event)
                 {
-                    after.entry((*event, *failed)).or_default().push(((*to, *untaken), Failed::Nothing));
+                    after.entry((*event, *failed)).or_default().push((*to, *untaken));
                 }
             }
         }
@@ -84,50 +83,46 @@ impl Beliefs {
             return *known;
         }
         let before = self.sets[belief as usize].clone();
-        let after = before.iter().filter_map(|((state, untaken), failed)| {
+        let after = before.iter().filter_map(|(state, untaken)| {
             let mut untaken = *untaken;
             *untaken.iter_mut().find(|place| **place == 0)? = number;
-            Some(((*state, untaken), *failed))
+            Some((*state, untaken))
         });
         // Where something has failed nobody can tell.
-        let well = || before.iter().filter(|(_, failed)| *failed == Failed::Nothing).map(|(possible, _)| possible);
         let heeds = |(state, untaken): &Possible| {
             let mut takes = self.automaton.leads(*state).iter();
             untaken[0] != 0 || takes.any(|(by, _)| *by == InterfaceAction::Takes { event, heeded: true })
         };
-        let down = |(state, _): &Possible| self.automaton.is_down(*state);
-        let lost = !well().any(|possible| heeds(possible) || down(possible));
+        let well: Vec<&Possible> = before.iter().filter(|(state, _)| !self.automaton.state(*state).failed).collect();
+        let down = |(state, _): &Possible| self.automaton.state(*state).down;
+        let lost = !well.is_empty() && !well.into_iter().any(|possible| heeds(possible) || down(possible));
         let known = (self.of(after.collect::<Vec<_>>()), lost);
         self.raised.insert((belief, number), known);
         known
     }
 
     /// What is known where it is in one of these, or silently got on from there.
-    fn of(&mut self, some: impl IntoIterator<Item = (Possible, Failed)>) -> u32 {
-        let mut met: FxHashMap<Possible, Failed> = FxHashMap::default();
-        let mut open: BinaryHeap<Reverse<(Failed, Possible)>> =
-            some.into_iter().map(|(possible, failed)| Reverse((failed, possible))).collect();
-        // What less fails in comes first.
-        while let Some(Reverse((failed, possible))) = open.pop() {
-            if met.contains_key(&possible) {
+    fn of(&mut self, some: impl IntoIterator<Item = Possible>) -> u32 {
+        let mut met: FxHashSet<Possible> = FxHashSet::default();
+        let mut open: Vec<Possible> = some.into_iter().collect();
+        while let Some((state, untaken)) = open.pop() {
+            if !met.insert((state, untaken)) {
                 continue;
             }
-            met.insert(possible, failed);
-            let (state, untaken) = possible;
             let taken = self.taken(untaken);
             for (by, to) in self.automaton.leads(state) {
                 match by {
-                    InterfaceAction::Silent(class) => open.push(Reverse((failed.max(*class), (*to, untaken)))),
-                    InterfaceAction::Tells(event) if self.heard.contains(event) => {}
-                    InterfaceAction::Tells(_) => open.push(Reverse((failed, (*to, untaken)))),
+                    InterfaceAction::Silent => open.push((*to, untaken)),
+                    InterfaceAction::Tells(event, _) if self.heard.contains(event) => {}
+                    InterfaceAction::Tells(..) => open.push((*to, untaken)),
                     InterfaceAction::Takes { event, .. } => {
                         let rest = taken.iter().filter(|(taken, _)| taken == event);
-                        open.extend(rest.map(|(_, rest)| Reverse((failed, (*to, *rest)))));
+                        open.extend(rest.map(|(_, rest)| (*to, *rest)));
                     }
                 }
             }
         }
-        let mut set: Vec<(Possible, Failed)> = met.into_iter().collect();
+        let mut set: Vec<Possible> = met.into_iter().collect();
         set.sort_unstable();
         let set: Belief = set.into();
         u32::try_from(self.sets.insert_full(set).0).unwrap_or(u32::MAX)
@@ -154,6 +149,7 @@ impl Beliefs {
 
 #[cfg(test)]
 mod tests {
+    use super::super::automaton::InterfaceState;
     use super::*;
 
     fn name(text: &str) -> EventName {
@@ -163,23 +159,23 @@ mod tests {
     /// Begun it tells that it is up; ended, that it is down; anything else comes to nothing.
     fn beliefs() -> Beliefs {
         let takes = |event: &str, heeded| InterfaceAction::Takes { event: name(event), heeded };
-        let tells = |event: &str| InterfaceAction::Tells(name(event));
-        let silent = InterfaceAction::Silent;
+        let tells = |event: &str, failed| InterfaceAction::Tells(name(event), failed);
         let edges = [
             (0, takes("e_start", true), 1),
             (0, takes("e_shutdown", false), 0),
-            (1, silent(Failed::Nothing), 2),
-            (1, silent(Failed::Apply), 5),
-            (2, tells("up"), 3),
+            (1, InterfaceAction::Silent, 2),
+            (1, InterfaceAction::Silent, 5),
+            (2, tells("up", Failed::Nothing), 3),
             (3, takes("e_shutdown", true), 4),
             (3, takes("e_start", false), 3),
-            (4, tells("down"), 0),
-            (5, tells("failed"), 3),
+            (4, tells("down", Failed::Nothing), 0),
+            (5, tells("failed", Failed::Apply), 3),
         ];
-        let down = vec![true, false, false, false, false, false];
+        let mut states = vec![InterfaceState::default(); 6];
+        (states[0].down, states[5].failed) = (true, true);
         let takes = vec![(name("e_start"), Precedence::UrgentAsLast), (name("e_shutdown"), Precedence::UrgentAsLast)];
         let heard = ["up", "down", "failed"].map(name).into();
-        Beliefs::new(Arc::new(InterfaceAutomaton::new(edges, down, 0)), takes, heard)
+        Beliefs::new(Arc::new(InterfaceAutomaton::new(edges, states, 0)), takes, heard)
     }
 
     fn told(beliefs: &mut Beliefs, belief: u32) -> Vec<(String, Failed)> {

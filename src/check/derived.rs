@@ -3,7 +3,7 @@
 //! What a parent is told without anybody writing it (*up*, *failed*, *down*, *stranded*) is told by the rule by which a running deployment tells
 //! it; times that are over may be over at any moment.
 
-use super::automaton::{InterfaceAction, InterfaceAutomaton};
+use super::automaton::{InterfaceAction, InterfaceAutomaton, InterfaceState};
 use super::edges::Edge;
 use super::explore::Graph;
 use super::product::Product;
@@ -26,8 +26,18 @@ pub struct ParentInterface {
     pub hears: BTreeSet<EventName>,
 }
 
-/// Where a subsystem is: a state of the product, what was told last, and whether it was told to go down and is not yet.
-type Place = (u32, Option<SubsystemStanding>, bool);
+/// Where a subsystem is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+struct Place {
+    /// A state of the product.
+    state: u32,
+    /// What was told last.
+    told: Option<SubsystemStanding>,
+    /// It was told to go down, and is not yet.
+    ending: bool,
+    /// The worst that has failed since it was begun.
+    failed: Failed,
+}
 
 /// What is made of a graph.
 struct Deriving<'g, 'p, 'a> {
@@ -37,8 +47,7 @@ struct Deriving<'g, 'p, 'a> {
     ends: EventName,
     seen: FxHashMap<u32, SeenStanding>,
     places: IndexMap<Place, u32, FxBuildHasher>,
-    /// Of each state of the automaton whether it is down.
-    down: Vec<bool>,
+    states: Vec<InterfaceState>,
     edges: Vec<(u32, InterfaceAction, u32)>,
 }
 
@@ -48,16 +57,21 @@ impl Graph<'_, '_> {
         let deployment: &Deployment = self.product.deployment;
         let (begins, ends) = (deployment.deploy.event, deployment.shutdown.event);
         let (seen, places) = (FxHashMap::default(), IndexMap::default());
-        let (down, edges) = (Vec::new(), Vec::new());
-        let mut deriving = Deriving { graph: self, parent, begins, ends, seen, places, down, edges };
-        let start = deriving.at((0, Some(SubsystemStanding::Down), false));
+        let (states, edges) = (Vec::new(), Vec::new());
+        let mut deriving = Deriving { graph: self, parent, begins, ends, seen, places, states, edges };
+        let start = deriving.at(Place {
+            state: 0,
+            told: Some(SubsystemStanding::Down),
+            ending: false,
+            failed: Failed::Nothing,
+        });
         let mut next = 0;
         while let Some((place, number)) = deriving.places.get_index(next).map(|(place, number)| (*place, *number)) {
             next += 1;
             deriving.standings(place, number);
             deriving.moves(place, number);
         }
-        InterfaceAutomaton::new(deriving.edges, deriving.down, start)
+        InterfaceAutomaton::new(deriving.edges, deriving.states, start)
     }
 }
 
@@ -67,37 +81,39 @@ impl Deriving<'_, '_, '_> {
         if let Some(known) = self.places.get(&place) {
             return *known;
         }
-        let number = self.fresh(place.1 == Some(SubsystemStanding::Down));
+        let number = self.fresh(place.told == Some(SubsystemStanding::Down), place.failed);
         self.places.insert(place, number);
         number
     }
 
-    fn fresh(&mut self, down: bool) -> u32 {
-        self.down.push(down);
-        u32::try_from(self.down.len() - 1).unwrap_or(u32::MAX)
+    fn fresh(&mut self, down: bool, failed: Failed) -> u32 {
+        self.states.push(InterfaceState { down, failed: failed != Failed::Nothing });
+        u32::try_from(self.states.len() - 1).unwrap_or(u32::MAX)
     }
 
     /// What is told by itself.
-    fn standings(&mut self, (state, told, ending): Place, number: u32) {
+    fn standings(&mut self, place: Place, number: u32) {
+        let Place { state, told, ending, failed } = place;
         let product = &*self.graph.product;
         let seen = *self.seen.entry(state).or_insert_with(|| product.seen_as_one(&self.graph.states[state as usize]));
         let late = SeenStanding { late: told.is_none(), stranded: ending, ..seen };
         let (in_time, late) = (standing(told, seen), standing(told, late));
         for now in in_time.into_iter().chain(late.filter(|late| in_time != Some(*late))) {
             let still = ending && now != SubsystemStanding::Down;
-            let to = self.at((state, Some(now), still));
-            self.tells(number, Failed::Nothing, &[now.own_event()], to);
+            let to = self.at(Place { told: Some(now), ending: still, ..place });
+            self.tells(number, failed, &[now.own_event()], to);
         }
     }
 
     /// What its moves show.
-    fn moves(&mut self, (state, told, ending): Place, number: u32) {
+    fn moves(&mut self, place: Place, number: u32) {
+        let state = place.state;
         let graph = self.graph;
         let at = &graph.states[state as usize];
         if graph.product.worlds.top(at.world).is_some() && graph.product.is_down(at) {
             // What is left is taken away by force, and it is as at the start.
-            let to = self.at((0, told, ending));
-            self.edges.push((number, InterfaceAction::Silent(Failed::Nothing), to));
+            let to = self.at(Place { state: 0, ..place });
+            self.edges.push((number, InterfaceAction::Silent, to));
             return;
         }
         let mut taken: BTreeSet<EventName> = BTreeSet::new();
@@ -105,38 +121,42 @@ impl Deriving<'_, '_, '_> {
             let by = &graph.edges[*edge as usize];
             let tells = graph.told.get(edge).cloned().unwrap_or_default();
             let names = self.brought(by);
+            let next = Place { state: by.to, failed: place.failed.max(by.failed()), ..place };
             if names.is_empty() {
-                let to = self.at((by.to, told, ending));
-                self.tells(number, by.failed(), &tells, to);
+                let to = self.at(next);
+                self.tells(number, next.failed, &tells, to);
             }
             for name in names {
-                let to = self.at((by.to, self.after(told, name), self.is_ending(ending, name)));
+                let next = self.after(next, name);
+                let to = self.at(next);
                 if !self.parent.raises.contains(&name) {
-                    self.tells(number, by.failed(), &tells, to);
+                    self.tells(number, next.failed, &tells, to);
                     continue;
                 }
                 taken.insert(name);
-                self.takes(number, name, !by.dropped(), &tells, to);
+                self.takes(number, (name, !by.dropped()), next.failed, &tells, to);
             }
         }
         if graph.followed[state as usize] && at.inbox.is_empty() && at.in_transit.is_empty() {
             for name in self.parent.raises.difference(&taken).copied().collect::<Vec<_>>() {
                 // Where one would take it, and so many requests wait that it was not followed, it waits as well.
                 if !graph.product.defers(at, name) {
-                    let to = self.at((state, self.after(told, name), self.is_ending(ending, name)));
-                    self.takes(number, name, false, &SharedList::new(), to);
+                    let next = self.after(place, name);
+                    let to = self.at(next);
+                    self.takes(number, (name, false), next.failed, &SharedList::new(), to);
                 }
             }
         }
     }
 
-    /// What was told last when it has taken an event up.
-    fn after(&self, told: Option<SubsystemStanding>, event: EventName) -> Option<SubsystemStanding> {
-        told.filter(|told| event != self.begins || *told != SubsystemStanding::Down)
-    }
-
-    fn is_ending(&self, ending: bool, event: EventName) -> bool {
-        event == self.ends || ending && event != self.begins
+    /// Where it is when it has taken an event up there.
+    fn after(&self, place: Place, event: EventName) -> Place {
+        let begins = event == self.begins && place.told == Some(SubsystemStanding::Down);
+        let ending = event == self.ends || place.ending && event != self.begins;
+        match begins {
+            true => Place { told: None, ending, failed: Failed::Nothing, ..place },
+            false => Place { ending, ..place },
+        }
     }
 
     /// The events of its parent, or that might as well be, that an edge brings; empty: none.
@@ -145,38 +165,41 @@ impl Deriving<'_, '_, '_> {
         self.graph.product.alike_to(at).collect()
     }
 
-    /// It takes an event, and tells what comes of that.
-    fn takes(&mut self, from: u32, event: EventName, heeded: bool, tells: &SharedList<EventName>, to: u32) {
+    /// It takes an event (heeded or not), and tells what comes of that.
+    fn takes(
+        &mut self,
+        from: u32,
+        (event, heeded): (EventName, bool),
+        failed: Failed,
+        tells: &SharedList<EventName>,
+        to: u32,
+    ) {
         let ignored = (!heeded).then(|| EventName::new(&format!("{event}{IGNORED}")).ok()).flatten();
         let tells: Vec<EventName> = ignored.into_iter().chain(tells.iter().copied()).collect();
         let taken = match tells.iter().any(|event| self.parent.hears.contains(event)) {
-            true => self.fresh(false),
+            true => self.fresh(false, failed),
             false => to,
         };
         self.edges.push((from, InterfaceAction::Takes { event, heeded }, taken));
         if taken != to {
-            self.tells(taken, Failed::Nothing, &tells, to);
+            self.tells(taken, failed, &tells, to);
         }
     }
 
-    /// It tells these one after the other, as far as its parent waits for them, when this has failed.
-    fn tells(&mut self, from: u32, class: Failed, events: &[EventName], to: u32) {
+    /// It tells these one after the other, as far as its parent waits for them, where this has failed.
+    fn tells(&mut self, from: u32, failed: Failed, events: &[EventName], to: u32) {
         let told: Vec<EventName> = events.iter().filter(|event| self.parent.hears.contains(event)).copied().collect();
         let Some((last, before)) = told.split_last() else {
-            self.edges.push((from, InterfaceAction::Silent(class), to));
+            self.edges.push((from, InterfaceAction::Silent, to));
             return;
         };
         let mut at = from;
-        if class != Failed::Nothing {
-            at = self.fresh(false);
-            self.edges.push((from, InterfaceAction::Silent(class), at));
-        }
         for event in before {
-            let next = self.fresh(false);
-            self.edges.push((at, InterfaceAction::Tells(*event), next));
+            let next = self.fresh(false, failed);
+            self.edges.push((at, InterfaceAction::Tells(*event, failed), next));
             at = next;
         }
-        self.edges.push((at, InterfaceAction::Tells(*last), to));
+        self.edges.push((at, InterfaceAction::Tells(*last, failed), to));
     }
 }
 

@@ -101,9 +101,7 @@ impl Product<'_> {
         let name = |number: u8| self.members[usize::from(number)].name.to_string();
         let event = |number: u8, event| self.members[usize::from(number)].chart.event_text(event);
         match next.by {
-            Move::Event(at) | Move::Dropped(at) => {
-                Happened::Event { event: self.outside[usize::from(at)].to_string() }
-            }
+            Move::Event(at) | Move::Dropped(at) => Happened::Event { event: self.outside[usize::from(at)].to_string() },
             Move::Unheard(at) => Happened::Unheard { event: self.outside[usize::from(at)].to_string() },
             Move::Time(number, at) => Happened::Time { coordinator: name(number), event: event(number, at) },
             Move::Taken(number, at) => Happened::Heard { coordinator: name(number), event: event(number, at) },
