@@ -10,6 +10,7 @@ use super::product::Product;
 use super::reactions::triggers;
 use super::shared_list::SharedList;
 use super::state::{Failed, Move, ProductState};
+use crate::limits;
 use crate::model::subsystem::{IGNORED, SeenStanding, standing};
 use crate::model::{Deployment, EventName, SubsystemStanding};
 use crate::statechart::EventId;
@@ -52,8 +53,8 @@ struct Deriving<'g, 'p, 'a> {
 }
 
 impl Graph<'_, '_> {
-    /// What these coordinators, which are all of a file, show its parent.
-    pub(super) fn derived(&self, parent: &ParentInterface) -> InterfaceAutomaton {
+    /// What these coordinators, which are all of a file, show its parent; none: there is too much of it.
+    pub(super) fn derived(&self, parent: &ParentInterface) -> Option<InterfaceAutomaton> {
         let deployment: &Deployment = self.product.deployment;
         let (begins, ends) = (deployment.deploy.event, deployment.shutdown.event);
         let (seen, places) = (FxHashMap::default(), IndexMap::default());
@@ -68,10 +69,13 @@ impl Graph<'_, '_> {
         let mut next = 0;
         while let Some((place, number)) = deriving.places.get_index(next).map(|(place, number)| (*place, *number)) {
             next += 1;
+            if deriving.places.len() > limits::CHECK_PLACES {
+                return None;
+            }
             deriving.standings(place, number);
             deriving.moves(place, number);
         }
-        InterfaceAutomaton::new(deriving.edges, deriving.states, start)
+        Some(InterfaceAutomaton::new(deriving.edges, deriving.states, start))
     }
 }
 
@@ -96,7 +100,10 @@ impl Deriving<'_, '_, '_> {
         let Place { state, told, ending, failed } = place;
         let product = &*self.graph.product;
         let seen = *self.seen.entry(state).or_insert_with(|| product.seen_as_one(&self.graph.states[state as usize]));
-        let late = SeenStanding { late: told.is_none(), stranded: ending, ..seen };
+        // Whose lateness nobody waits for is not told apart from others.
+        let waits = |word: SubsystemStanding| self.parent.hears.contains(&word.own_event());
+        let late = told.is_none() && waits(SubsystemStanding::Failed);
+        let late = SeenStanding { late, stranded: ending, ..seen };
         let (in_time, late) = (standing(told, seen), standing(told, late));
         for now in in_time.into_iter().chain(late.filter(|late| in_time != Some(*late))) {
             let still = ending && now != SubsystemStanding::Down;
@@ -152,7 +159,8 @@ impl Deriving<'_, '_, '_> {
     /// Where it is when it has taken an event up there.
     fn after(&self, place: Place, event: EventName) -> Place {
         let begins = event == self.begins && place.told == Some(SubsystemStanding::Down);
-        let ending = event == self.ends || place.ending && event != self.begins;
+        let minds = self.parent.hears.contains(&SubsystemStanding::Stranded.own_event());
+        let ending = minds && (event == self.ends || place.ending && event != self.begins);
         match begins {
             true => Place { told: None, ending, failed: Failed::Nothing, ..place },
             false => Place { ending, ..place },

@@ -239,7 +239,7 @@ fn follow(
             );
             explored = explored.and(graph.explored());
             if let Some(parent) = around.parent.as_ref().filter(|_| numbers == all && verified && pure) {
-                shows = Some(Arc::new(graph.derived(parent)));
+                shows = graph.derived(parent).map(Arc::new);
             }
             asked.extend(product.worlds.asked());
             break;

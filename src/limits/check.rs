@@ -8,6 +8,10 @@ pub const CHECK_TRANSITIONS: usize = 600_000;
 /// more it is followed with subsystems that may tell anything in any order: that has fewer states, and may refuse too much.
 pub const CHECK_BELIEVED: usize = 300_000;
 
+/// States of a subsystem, each as often as it differs in what its parent was told and in what has failed, up to which an interface automaton is
+/// made of them: a tenth of a second. One with more may tell anything in any order.
+pub const CHECK_PLACES: usize = 100_000;
+
 /// The largest number of transitions that `--budget` takes.
 pub const CHECK_TRANSITIONS_MOST: usize = 1_000_000_000;
 
