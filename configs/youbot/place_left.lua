@@ -1,2 +1,0 @@
-robot = "left"
-return rfsm.load("place.lua")

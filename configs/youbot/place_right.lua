@@ -1,2 +1,0 @@
-robot = "right"
-return rfsm.load("place.lua")
