@@ -191,7 +191,13 @@ impl InterfaceAutomaton {
 
     /// The same with the states of one number as one.
     fn merged(&self, of: &[u32]) -> Self {
-        let len = of.iter().max().map_or(0, |most| *most as usize + 1);
+        // Numbers that nothing has are none.
+        let mut numbers: Vec<u32> = of.to_vec();
+        numbers.sort_unstable();
+        numbers.dedup();
+        let name = |number: &u32| u32::try_from(numbers.partition_point(|of| of < number)).unwrap_or(u32::MAX);
+        let of: Vec<u32> = of.iter().map(name).collect();
+        let (of, len) = (&of[..], numbers.len());
         let mut edges = vec![InterfaceEdges::new(); len];
         let mut states = vec![InterfaceState { down: true, failed: true }; len];
         for at in 0..self.len() {

@@ -7,7 +7,7 @@
 
 use super::automaton::{InterfaceAction, InterfaceAutomaton};
 use super::state::Failed;
-use crate::model::{EventName, Precedence, precedence::taken_first};
+use crate::model::{EventName, Precedence, SubsystemStanding, precedence::taken_first};
 use indexmap::IndexSet;
 use rustc_hash::{FxBuildHasher, FxHashMap, FxHashSet};
 use smallvec::SmallVec;
@@ -64,6 +64,7 @@ impl Beliefs {
             for (by, to) in self.automaton.leads(*state) {
                 if let InterfaceAction::Tells(event, failed) = by
                     && self.heard.contains(event)
+                    && is_told(*event, *untaken)
                 {
                     after.entry((*event, *failed)).or_default().push((*to, *untaken));
                 }
@@ -114,6 +115,7 @@ impl Beliefs {
                 match by {
                     InterfaceAction::Silent => open.push((*to, untaken)),
                     InterfaceAction::Tells(event, _) if self.heard.contains(event) => {}
+                    InterfaceAction::Tells(event, _) if !is_told(*event, untaken) => {}
                     InterfaceAction::Tells(..) => open.push((*to, untaken)),
                     InterfaceAction::Takes { event, .. } => {
                         let rest = taken.iter().filter(|(taken, _)| taken == event);
@@ -145,6 +147,12 @@ impl Beliefs {
         }
         all
     }
+}
+
+/// Whether an event is told where so much is still to be taken: that it is down is seen where it rests, and what lies before it then comes to
+/// nothing there. That it is up may have been told before the parent raised that.
+fn is_told(event: EventName, untaken: [u8; MOST_UNTAKEN]) -> bool {
+    untaken[0] == 0 || event != SubsystemStanding::Down.own_event()
 }
 
 #[cfg(test)]

@@ -4,9 +4,8 @@
 //! parent is followed against their interface automata ([`derived`](super::derived)); of what they are made of there
 //! are the components that they export, which are there while that is promised ([`promises`](super::promises) holds both to it).
 
-use super::around::Around;
 use super::automaton::InterfaceAutomaton;
-use super::derived::ParentInterface;
+use super::neighbours::{Neighbours, ParentInterface, accepted};
 use super::report::{Accepted, Explored, Report};
 use super::simulated;
 use super::trace::{Does, TraceStep};
@@ -14,28 +13,28 @@ use super::universe::Universe;
 use super::verdict::CheckVerdict;
 use crate::model::subsystem::ExportKind;
 use crate::model::{
-    Catalogue, Change, ChangeKind, ComponentName, ComponentType, ConfigId, Configuration, Deployment, EventName,
-    Finding, Ident, StateEntry, StateList, Subsystem, Target, Value, ValueType, Wanted,
+    Catalogue, Change, ChangeKind, ComponentName, ComponentType, ConfigId, Configuration, Deployment, Finding, Ident,
+    StateEntry, StateList, Subsystem, Target, Value, ValueType, Wanted,
 };
 use crate::stack::contenders::may_hold;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 /// What there is to say of a file, and what it shows its parent, where that was asked for and is known.
-pub type Shown = (Report, Option<Arc<InterfaceAutomaton>>);
+pub type CheckedFile = (Report, Option<Arc<InterfaceAutomaton>>);
 
 /// Checks a deployment, each of its files alone: `one` checks one. `around`: what is around all of it.
 pub fn run(
     whole: Arc<Deployment>,
     catalogue: &Catalogue,
-    around: &Around,
-    one: &dyn Fn(Arc<Deployment>, &Catalogue, &Around) -> Shown,
-) -> Shown {
+    around: &Neighbours,
+    one: &dyn Fn(Arc<Deployment>, &Catalogue, &Neighbours) -> CheckedFile,
+) -> CheckedFile {
     if whole.own.is_none() {
         return one(whole, catalogue, around);
     }
     let mut reports: Vec<(Option<Ident>, Report)> = Vec::new();
-    let mut around = Around { parent: around.parent.clone(), ..Around::default() };
+    let mut around = Neighbours { parent: around.parent.clone(), ..Neighbours::default() };
     for subsystem in &whole.subsystems {
         let alike = whole.subsystems.iter().find(|other| Arc::ptr_eq(&other.own, &subsystem.own));
         if let Some(first) = alike.filter(|first| first.name != subsystem.name) {
@@ -46,7 +45,7 @@ pub fn run(
         }
         let local = catalogue.known_in(subsystem.name);
         let parent = Some(ParentInterface::of(whole.own_part(), subsystem));
-        let (report, shows) = run(subsystem.own.clone(), &local, &Around { parent, ..Around::default() }, one);
+        let (report, shows) = run(subsystem.own.clone(), &local, &Neighbours { parent, ..Neighbours::default() }, one);
         around.children.extend(shows.map(|shows| (subsystem.name, shows)));
         reports.push((Some(subsystem.name), report));
     }
@@ -100,13 +99,6 @@ fn parents_view(own: &Deployment, catalogue: &Catalogue) -> (Deployment, Catalog
         view.configurations.push(made);
     }
     (view, types)
-}
-
-/// The events that a parent may raise, by their names there.
-pub fn accepted(subsystem: &Subsystem) -> BTreeSet<EventName> {
-    let own = &*subsystem.own;
-    let accepts = own.interface.accepts.iter().map(|(event, _)| *event);
-    accepts.chain([own.deploy.event, own.shutdown.event]).map(|event| event.within(subsystem.name)).collect()
 }
 
 /// The components that a subsystem exports something of, each with a type that has that and nothing else.

@@ -6,6 +6,7 @@
 use super::automaton::{InterfaceAction, InterfaceAutomaton, InterfaceState};
 use super::edges::Edge;
 use super::explore::Graph;
+use super::neighbours::ParentInterface;
 use super::product::Product;
 use super::reactions::triggers;
 use super::shared_list::SharedList;
@@ -18,18 +19,9 @@ use indexmap::IndexMap;
 use rustc_hash::{FxBuildHasher, FxHashMap};
 use std::collections::BTreeSet;
 
-/// What a parent and a subsystem have to do with each other. Events have the names of the subsystem's own file.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct ParentInterface {
-    /// What the parent raises of what it accepts.
-    pub raises: BTreeSet<EventName>,
-    /// What the parent waits for of what it tells.
-    pub hears: BTreeSet<EventName>,
-}
-
 /// Where a subsystem is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-struct Place {
+struct ShownPlace {
     /// A state of the product.
     state: u32,
     /// What was told last.
@@ -47,7 +39,7 @@ struct Deriving<'g, 'p, 'a> {
     begins: EventName,
     ends: EventName,
     seen: FxHashMap<u32, SeenStanding>,
-    places: IndexMap<Place, u32, FxBuildHasher>,
+    places: IndexMap<ShownPlace, u32, FxBuildHasher>,
     states: Vec<InterfaceState>,
     edges: Vec<(u32, InterfaceAction, u32)>,
 }
@@ -60,7 +52,7 @@ impl Graph<'_, '_> {
         let (seen, places) = (FxHashMap::default(), IndexMap::default());
         let (states, edges) = (Vec::new(), Vec::new());
         let mut deriving = Deriving { graph: self, parent, begins, ends, seen, places, states, edges };
-        let start = deriving.at(Place {
+        let start = deriving.at(ShownPlace {
             state: 0,
             told: Some(SubsystemStanding::Down),
             ending: false,
@@ -81,7 +73,7 @@ impl Graph<'_, '_> {
 
 impl Deriving<'_, '_, '_> {
     /// The number of the automaton's state for that.
-    fn at(&mut self, place: Place) -> u32 {
+    fn at(&mut self, place: ShownPlace) -> u32 {
         if let Some(known) = self.places.get(&place) {
             return *known;
         }
@@ -96,8 +88,8 @@ impl Deriving<'_, '_, '_> {
     }
 
     /// What is told by itself.
-    fn standings(&mut self, place: Place, number: u32) {
-        let Place { state, told, ending, failed } = place;
+    fn standings(&mut self, place: ShownPlace, number: u32) {
+        let ShownPlace { state, told, ending, failed } = place;
         let product = &*self.graph.product;
         let seen = *self.seen.entry(state).or_insert_with(|| product.seen_as_one(&self.graph.states[state as usize]));
         // Whose lateness nobody waits for is not told apart from others.
@@ -107,19 +99,19 @@ impl Deriving<'_, '_, '_> {
         let (in_time, late) = (standing(told, seen), standing(told, late));
         for now in in_time.into_iter().chain(late.filter(|late| in_time != Some(*late))) {
             let still = ending && now != SubsystemStanding::Down;
-            let to = self.at(Place { told: Some(now), ending: still, ..place });
+            let to = self.at(ShownPlace { told: Some(now), ending: still, ..place });
             self.tells(number, failed, &[now.own_event()], to);
         }
     }
 
     /// What its moves show.
-    fn moves(&mut self, place: Place, number: u32) {
+    fn moves(&mut self, place: ShownPlace, number: u32) {
         let state = place.state;
         let graph = self.graph;
         let at = &graph.states[state as usize];
         if graph.product.worlds.top(at.world).is_some() && graph.product.is_down(at) {
             // What is left is taken away by force, and it is as at the start.
-            let to = self.at(Place { state: 0, ..place });
+            let to = self.at(ShownPlace { state: 0, ..place });
             self.edges.push((number, InterfaceAction::Silent, to));
             return;
         }
@@ -128,7 +120,7 @@ impl Deriving<'_, '_, '_> {
             let by = &graph.edges[*edge as usize];
             let tells = graph.told.get(edge).cloned().unwrap_or_default();
             let names = self.brought(by);
-            let next = Place { state: by.to, failed: place.failed.max(by.failed()), ..place };
+            let next = ShownPlace { state: by.to, failed: place.failed.max(by.failed()), ..place };
             if names.is_empty() {
                 let to = self.at(next);
                 self.tells(number, next.failed, &tells, to);
@@ -157,13 +149,13 @@ impl Deriving<'_, '_, '_> {
     }
 
     /// Where it is when it has taken an event up there.
-    fn after(&self, place: Place, event: EventName) -> Place {
+    fn after(&self, place: ShownPlace, event: EventName) -> ShownPlace {
         let begins = event == self.begins && place.told == Some(SubsystemStanding::Down);
         let minds = self.parent.hears.contains(&SubsystemStanding::Stranded.own_event());
         let ending = minds && (event == self.ends || place.ending && event != self.begins);
         match begins {
-            true => Place { told: None, ending, failed: Failed::Nothing, ..place },
-            false => Place { ending, ..place },
+            true => ShownPlace { told: None, ending, failed: Failed::Nothing, ..place },
+            false => ShownPlace { ending, ..place },
         }
     }
 

@@ -5,7 +5,6 @@
 
 mod adjacency;
 mod alone;
-mod around;
 mod arrive;
 mod aside;
 mod automaton;
@@ -44,6 +43,7 @@ mod interface;
 mod interned;
 mod judge;
 mod kept;
+mod known;
 mod lasts;
 mod late;
 mod let_go;
@@ -54,6 +54,7 @@ mod loss;
 mod members;
 mod met;
 mod monitors;
+mod neighbours;
 mod nowhere;
 mod offers;
 mod once;

@@ -1,11 +1,11 @@
 //! The whole check, one family after the other; and single families, for who changes a running deployment.
 
-use super::around::Around;
 use super::automaton::InterfaceAutomaton;
 use super::bound::Bound;
 use super::effort::Effort;
 use super::explore::explore;
 use super::judge::Traced;
+use super::neighbours::Neighbours;
 use super::product::Product;
 use super::report::{Accepted, Explored, Report};
 use super::state::Failed;
@@ -30,16 +30,21 @@ pub fn run(deployment: impl Into<Arc<Deployment>>, catalogue: &Catalogue) -> Rep
 
 /// The same with more effort, or less.
 pub fn run_with(deployment: impl Into<Arc<Deployment>>, catalogue: &Catalogue, effort: Effort<'_>) -> Report {
-    let one = |own, catalogue: &Catalogue, around: &Around| run_one(own, catalogue, effort, around);
+    let one = |own, catalogue: &Catalogue, around: &Neighbours| run_one(own, catalogue, effort, around);
     let (report, _) = match effort.together {
-        true => one(deployment.into(), catalogue, &Around::default()),
-        false => composed::run(deployment.into(), catalogue, &Around::default(), &one),
+        true => one(deployment.into(), catalogue, &Neighbours::default()),
+        false => composed::run(deployment.into(), catalogue, &Neighbours::default(), &one),
     };
     report
 }
 
 /// The check of one file.
-fn run_one(shared: Arc<Deployment>, catalogue: &Catalogue, effort: Effort<'_>, around: &Around) -> composed::Shown {
+fn run_one(
+    shared: Arc<Deployment>,
+    catalogue: &Catalogue,
+    effort: Effort<'_>,
+    around: &Neighbours,
+) -> composed::CheckedFile {
     let deployment = &*shared;
     let universe = universe::Universe::new(deployment, catalogue);
     let mut findings = types::check(deployment, catalogue);
@@ -118,7 +123,7 @@ struct Followed<'f, 'e> {
     charts: &'f [&'f Chart],
     catalogue: &'f Catalogue,
     effort: Effort<'e>,
-    around: &'f Around,
+    around: &'f Neighbours,
 }
 
 /// Follows the coordinators, those together that have to do with each other. `left` is told what was left out. Answers also what they show
@@ -180,6 +185,8 @@ fn follow(
             if graph.product.knows_children() && graph.bounds.contains_key(&Bound::Budget) {
                 // With all that is known of them there is too much of it.
                 graph.product.forget_children();
+                left.insert("in which order subsystems tell things was not followed".to_owned());
+                explored.complete = false;
                 graph.product.follow_with(effort);
                 continue;
             }

@@ -1,5 +1,4 @@
-//! The configurator's own thread: mail comes in, what the desk lets begin goes on, everything is answered; and it survives
-//! itself.
+//! The configurator's own thread: mail comes in, what the desk lets begin goes on, everything is answered; it survives itself.
 
 use super::conditions::{Conditions, Standings};
 use super::confirmations::Confirmations;

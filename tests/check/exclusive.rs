@@ -46,6 +46,7 @@ fn in_turns() -> Vec<Change> {
         ("pair.lua", "trans { src = 'raising', tgt = 'two', events = { 'right/up' } }", "trans { src = 'one', tgt = 'two', events = { 'left/down' } }"),
         ("pair.lua", "trans { src = 'one', tgt = 'coupling', events = { 'right/up' } },", ""),
         ("pair.lua", "src = 'two', tgt = 'coupling', events = { 'left/up' }", "src = 'two', tgt = 'coupling', events = { 'right/up' }"),
+        ("pair.lua", "events = { 'e_shutdown', 'left/e_leaving', 'right/e_leaving',", "events = { 'e_shutdown', 'right/e_leaving',"),
     ];
     BUS.into_iter().chain(turns).collect()
 }

@@ -1,45 +1,16 @@
-//! What is around a file that is followed alone: the parent of its deployment, as far as the two have to do with each other, and its own
-//! subsystems, as far as these show what they do.
+//! What is known of the subsystems of the deployment that is followed.
 
-use super::automaton::InterfaceAutomaton;
 use super::belief::Beliefs;
-use super::derived::ParentInterface;
 use super::effort::Left;
+use super::neighbours::Neighbours;
 use super::product::Product;
 use crate::limits;
-use crate::model::{Deployment, EventName, Ident, Subsystem};
-use std::collections::{BTreeMap, BTreeSet};
-use std::sync::Arc;
-
-/// What is around a file.
-#[derive(Debug, Default)]
-pub struct Around {
-    /// Its parent; none: it has none, or that is not looked at.
-    pub parent: Option<ParentInterface>,
-    /// What its subsystems show, by their names. One that is not here may tell anything in any order.
-    pub children: BTreeMap<Ident, Arc<InterfaceAutomaton>>,
-}
-
-impl ParentInterface {
-    /// What the coordinators of a file raise and hear of a subsystem, and of those that are of the same file: all are followed once.
-    pub fn of(own: &Deployment, subsystem: &Subsystem) -> Self {
-        let mut interface = Self::default();
-        for alike in own.subsystems.iter().filter(|other| Arc::ptr_eq(&other.own, &subsystem.own)) {
-            let local = |event: EventName| EventName::new(event.local(alike.name)?).ok();
-            for chart in own.charts() {
-                interface.hears.extend(chart.waited_for().into_iter().filter_map(local));
-            }
-            let raised = super::composed::accepted(alike).into_iter();
-            let raised = raised.filter(|event| own.charts().any(|chart| chart.raises(event.as_str())));
-            interface.raises.extend(raised.filter_map(local));
-        }
-        interface
-    }
-}
+use crate::model::EventName;
+use std::collections::BTreeSet;
 
 impl<'a> Product<'a> {
     /// This is around the deployment.
-    pub(super) fn stands_in(&mut self, around: &Around) {
+    pub(super) fn stands_in(&mut self, around: &Neighbours) {
         self.parent = around.parent.clone();
         for child in &mut self.children {
             let local = |event: &EventName| EventName::new(event.local(child.path)?).ok();

@@ -1,0 +1,49 @@
+//! What is around a file that is followed alone: the parent of its deployment, as far as the two have to do with each other, and its own
+//! subsystems, as far as these show what they do.
+
+use super::automaton::InterfaceAutomaton;
+use crate::model::{Deployment, EventName, Ident, Subsystem};
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+/// What a parent and a subsystem have to do with each other. Events have the names of the subsystem's own file.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct ParentInterface {
+    /// What the parent raises of what it accepts.
+    pub raises: BTreeSet<EventName>,
+    /// What the parent waits for of what it tells.
+    pub hears: BTreeSet<EventName>,
+}
+
+/// What is around a file.
+#[derive(Debug, Default)]
+pub struct Neighbours {
+    /// Its parent; none: it has none, or that is not looked at.
+    pub parent: Option<ParentInterface>,
+    /// What its subsystems show, by their names. One that is not here may tell anything in any order.
+    pub children: BTreeMap<Ident, Arc<InterfaceAutomaton>>,
+}
+
+impl ParentInterface {
+    /// What the coordinators of a file raise and hear of a subsystem, and of those that are of the same file: all are followed once.
+    pub fn of(own: &Deployment, subsystem: &Subsystem) -> Self {
+        let mut interface = Self::default();
+        for alike in own.subsystems.iter().filter(|other| Arc::ptr_eq(&other.own, &subsystem.own)) {
+            let local = |event: EventName| EventName::new(event.local(alike.name)?).ok();
+            for chart in own.charts() {
+                interface.hears.extend(chart.waited_for().into_iter().filter_map(local));
+            }
+            let raised = accepted(alike).into_iter();
+            let raised = raised.filter(|event| own.charts().any(|chart| chart.raises(event.as_str())));
+            interface.raises.extend(raised.filter_map(local));
+        }
+        interface
+    }
+}
+
+/// The events that a parent may raise, by their names there.
+pub fn accepted(subsystem: &Subsystem) -> BTreeSet<EventName> {
+    let own = &*subsystem.own;
+    let accepts = own.interface.accepts.iter().map(|(event, _)| *event);
+    accepts.chain([own.deploy.event, own.shutdown.event]).map(|event| event.within(subsystem.name)).collect()
+}
