@@ -35,21 +35,25 @@ pub struct Beliefs {
     /// What its parent waits for; what else it tells is nothing to see.
     heard: BTreeSet<EventName>,
     takes: Vec<(EventName, Precedence)>,
+    /// What others raise for it of whom nothing is known here: that comes at any time.
+    others: BTreeSet<EventName>,
     sets: IndexSet<Belief, FxBuildHasher>,
     tells: FxHashMap<u32, MayTell>,
     raised: FxHashMap<(u32, u8), (u32, bool)>,
 }
 
 impl Beliefs {
-    /// Nothing was raised yet. `takes`: what the parent may raise, and what of that goes first; by the names of the subsystem's own file, like `heard`.
+    /// Nothing was raised yet. `takes`: what those who are followed may raise, and what of that goes first; `others`: what coordinators of
+    /// the parent may raise who are not; by the names of the subsystem's own file, like `heard`.
     pub fn new(
         automaton: Arc<InterfaceAutomaton>,
         takes: Vec<(EventName, Precedence)>,
+        others: BTreeSet<EventName>,
         heard: BTreeSet<EventName>,
     ) -> Self {
         let start = automaton.start();
         let (sets, tells, raised) = (IndexSet::default(), FxHashMap::default(), FxHashMap::default());
-        let mut beliefs = Self { automaton, heard, takes, sets, tells, raised };
+        let mut beliefs = Self { automaton, heard, takes, others, sets, tells, raised };
         beliefs.of([(start, [0; MOST_UNTAKEN])]);
         beliefs
     }
@@ -118,6 +122,7 @@ impl Beliefs {
                     InterfaceAction::Tells(event, _) if !is_told(*event, untaken) => {}
                     InterfaceAction::Tells(..) => open.push((*to, untaken)),
                     InterfaceAction::Takes { event, .. } => {
+                        open.extend(self.others.contains(event).then_some((*to, untaken)));
                         let rest = taken.iter().filter(|(taken, _)| taken == event);
                         open.extend(rest.map(|(_, rest)| (*to, *rest)));
                     }
@@ -166,6 +171,11 @@ mod tests {
 
     /// Begun it tells that it is up; ended, that it is down; anything else comes to nothing.
     fn beliefs() -> Beliefs {
+        beliefs_beside(BTreeSet::new())
+    }
+
+    /// The same, and others raise these.
+    fn beliefs_beside(others: BTreeSet<EventName>) -> Beliefs {
         let takes = |event: &str, heeded| InterfaceAction::Takes { event: name(event), heeded };
         let tells = |event: &str, failed| InterfaceAction::Tells(name(event), failed);
         let edges = [
@@ -183,7 +193,7 @@ mod tests {
         (states[0].down, states[5].failed) = (true, true);
         let takes = vec![(name("e_start"), Precedence::UrgentAsLast), (name("e_shutdown"), Precedence::UrgentAsLast)];
         let heard = ["up", "down", "failed"].map(name).into();
-        Beliefs::new(Arc::new(InterfaceAutomaton::new(edges, states, 0)), takes, heard)
+        Beliefs::new(Arc::new(InterfaceAutomaton::new(edges, states, 0)), takes, others, heard)
     }
 
     fn told(beliefs: &mut Beliefs, belief: u32) -> Vec<(String, Failed)> {
@@ -218,5 +228,12 @@ mod tests {
         let (begun, _) = of.raised(0, name("e_start"));
         let up = of.tells(begun)[1].2;
         assert!(of.raised(up, name("e_start")).1, "it is up, and takes no second one");
+    }
+    #[test]
+    fn what_others_raise_may_come_at_any_time() {
+        let mut of = beliefs_beside([name("e_shutdown")].into());
+        let (begun, _) = of.raised(0, name("e_start"));
+        let up = of.tells(begun)[1].2;
+        assert_eq!(told(&mut of, up), [("down".to_owned(), Failed::Nothing)], "somebody else may have ended it");
     }
 }

@@ -63,6 +63,8 @@ pub enum Bound {
     Entered,
     /// Whether what a configuration stands for becomes true where others change what it looks at.
     Stands,
+    /// [`limits::CHECK_PLACES`], [`limits::CHECK_BELIEVED`]: in which order subsystems tell things.
+    Told,
     /// [`limits::CHECK_DRIVEN`]: how long a way up or down lasts.
     Times,
 }
@@ -154,6 +156,9 @@ impl Bound {
                 "what a safe configuration of a coordinator that is followed apart interrupts was not followed behind something that \
                  failed, nor what comes while it is being applied"
                     .to_owned()
+            }
+            Self::Told => {
+                "in which order subsystems tell things, and that these do not wait to be heard, was not followed".to_owned()
             }
             Self::Entered => "a coordinator could not be entered".to_owned(),
             Self::Times => {

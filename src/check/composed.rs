@@ -46,6 +46,8 @@ pub fn run(
         let local = catalogue.known_in(subsystem.name);
         let parent = Some(ParentInterface::of(whole.own_part(), subsystem));
         let (report, shows) = run(subsystem.own.clone(), &local, &Neighbours { parent, ..Neighbours::default() }, one);
+        // What is refused is not run: what it might tell is not worth following.
+        let shows = shows.filter(|_| report.verdict != CheckVerdict::Refused);
         around.children.extend(shows.map(|shows| (subsystem.name, shows)));
         reports.push((Some(subsystem.name), report));
     }

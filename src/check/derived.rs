@@ -126,6 +126,10 @@ impl Deriving<'_, '_, '_> {
                 self.tells(number, next.failed, &tells, to);
             }
             for name in names {
+                if name == self.begins && !self.parent.raises.contains(&name) {
+                    // Nobody begins it.
+                    continue;
+                }
                 let next = self.after(next, name);
                 let to = self.at(next);
                 if !self.parent.raises.contains(&name) {

@@ -2,7 +2,7 @@
 
 use super::belief::Beliefs;
 use super::effort::Left;
-use super::neighbours::Neighbours;
+use super::neighbours::{Neighbours, accepted};
 use super::product::Product;
 use crate::limits;
 use crate::model::EventName;
@@ -19,14 +19,23 @@ impl<'a> Product<'a> {
             let raised: BTreeSet<EventName> = raised.filter_map(|site| local(&site.name)).collect();
             let of = self.deployment.subsystems.iter().find(|subsystem| subsystem.name == child.path);
             let Some((of, automaton)) = of.zip(around.children.get(&child.path)) else { continue };
+            let charts = || self.deployment.charts();
+            let raised_by_some = |event: &EventName| charts().any(|chart| chart.raises(event.as_str()));
+            let others = accepted(of).into_iter().filter(raised_by_some).filter_map(|event| local(&event));
+            let others = others.filter(|event| !raised.contains(event)).collect();
             let takes = raised.into_iter().map(|event| (event, of.own.precedence(event))).collect();
-            child.beliefs = Some(Beliefs::new(automaton.clone(), takes, heard));
+            child.beliefs = Some(Beliefs::new(automaton.clone(), takes, others, heard));
         }
     }
 
     /// Whether it is known of a subsystem what it may tell.
     pub(super) fn knows_children(&self) -> bool {
         self.children.iter().any(|child| child.beliefs.is_some())
+    }
+
+    /// Whether nothing is known of the order in which one of them tells things.
+    pub(super) fn knows_no_order(&self) -> bool {
+        self.children.iter().any(|child| child.beliefs.is_none())
     }
 
     /// From now on they may tell anything in any order.

@@ -185,8 +185,6 @@ fn follow(
             if graph.product.knows_children() && graph.bounds.contains_key(&Bound::Budget) {
                 // With all that is known of them there is too much of it.
                 graph.product.forget_children();
-                left.insert("in which order subsystems tell things was not followed".to_owned());
-                explored.complete = false;
                 graph.product.follow_with(effort);
                 continue;
             }
@@ -222,6 +220,9 @@ fn follow(
             }
             if graph.product.elsewhere.is_some() {
                 graph.cut(Bound::Elsewhere, Failed::Nothing);
+            }
+            if graph.product.knows_no_order() {
+                graph.cut(Bound::Told, Failed::Nothing);
             }
             if waits {
                 graph.cut(Bound::Anew, Failed::Nothing);

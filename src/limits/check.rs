@@ -9,7 +9,7 @@ pub const CHECK_TRANSITIONS: usize = 600_000;
 pub const CHECK_BELIEVED: usize = 300_000;
 
 /// States of a subsystem, each as often as it differs in what its parent was told and in what has failed, up to which an interface automaton is
-/// made of them: a tenth of a second. One with more may tell anything in any order.
+/// made of them. One with more may tell anything in any order.
 pub const CHECK_PLACES: usize = 100_000;
 
 /// The largest number of transitions that `--budget` takes.
