@@ -91,3 +91,22 @@ fn a_composition_that_waits_where_things_are_told_is_sound() {
     let warned = report.findings.iter().filter(|finding| finding.severity > Severity::Info).count();
     assert_eq!((warned, report.verdict), (0, CheckVerdict::Sound), "{:#?} {:#?}", report.findings, report.left);
 }
+
+#[test]
+fn a_subsystem_that_nobody_begins_never_comes_up() {
+    let nobody = ("pair.lua", "entry = { 'left/e_start', 'right/e_start' }", "entry = 'right/e_start'");
+    let says = with(&found(&[nobody]), "deploy::never_up", Severity::Error);
+    assert!(says.len() == 1 && says[0].contains("never reaches `coupled`"), "{says:?}");
+}
+
+#[test]
+fn to_let_go_twice_is_to_let_go() {
+    let twice = (
+        "pair.lua",
+        "'left/e_released', 'right/e_released' }",
+        "'left/e_released', 'right/e_released', 'left/e_released' }",
+    );
+    let found = found(&[twice]);
+    let warned: Vec<&Finding> = found.iter().filter(|finding| finding.severity > Severity::Info).collect();
+    assert!(warned.is_empty(), "{warned:#?}");
+}
