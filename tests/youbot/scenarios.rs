@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Each with what is set for it here: what takes a minute in the file is shorter.
-const SCENARIOS: [(&str, &[(&str, &str)]); 18] = [
+const SCENARIOS: [(&str, &[(&str, &str)]); 19] = [
     ("bring_up", &[]),
     ("crash", &[]),
     ("driver", &[]),
@@ -26,6 +26,7 @@ const SCENARIOS: [(&str, &[(&str, &str)]); 18] = [
     ("saturated", &[]),
     ("shutdown_while_copying", &[]),
     ("tracking", &[("seconds", "20")]),
+    ("tuned", &[]),
     ("udp", &[]),
 ];
 
@@ -149,6 +150,11 @@ fn shutdown_while_copying() {
 #[test]
 fn tracking() {
     run("tracking");
+}
+
+#[test]
+fn tuned() {
+    run("tuned");
 }
 
 #[test]
