@@ -76,18 +76,18 @@ pub(super) fn fit(frames: &mut Vec<Arc<Frame>>, quota: Quota<'_>, memory: Option
     while quota.own(frames).count() > quota.bound {
         let Some(Pair { lower, upper, way }) = pair(frames, quota) else { return false };
         let left = match way {
-            Way::Up(ref hand) if !hand.is_empty() => {
+            Passage::Up(ref hand) if !hand.is_empty() => {
                 share::hand_over(frames, hand, &|id| id);
                 Some(overwritten(&frames[lower], &hand.slots))
             }
-            Way::Up(_) | Way::Down => None,
+            Passage::Up(_) | Passage::Down => None,
         };
         let made = match (&left, memory) {
             (Some(left), _) => Arc::new(squash(left, &frames[upper])),
             (None, Some(memory)) => memory.squash(&frames[lower], &frames[upper]),
             (None, None) => Arc::new(squash(&frames[lower], &frames[upper])),
         };
-        let (stays, goes) = if matches!(way, Way::Down) { (lower, upper) } else { (upper, lower) };
+        let (stays, goes) = if matches!(way, Passage::Down) { (lower, upper) } else { (upper, lower) };
         frames[stays] = made;
         frames.remove(goes);
     }
@@ -98,11 +98,11 @@ pub(super) fn fit(frames: &mut Vec<Arc<Frame>>, quota: Quota<'_>, memory: Option
 struct Pair {
     lower: usize,
     upper: usize,
-    way: Way,
+    way: Passage,
 }
 
 /// Where they become one.
-enum Way {
+enum Passage {
     /// At the lower one's place: the upper one shares with nothing between.
     Down,
     /// At the upper one's place: what lies between takes over what the lower one wrote, and the upper one wrote that again.
@@ -152,9 +152,9 @@ pub(super) fn between<'f>(frames: &'f [Arc<Frame>], quota: Quota<'_>) -> Option<
 }
 
 /// How two become one past what lies between: whatever is undone later leads to where it would have led.
-fn way(frames: &[Arc<Frame>], lower: usize, upper: usize, busy: &[FrameId]) -> Option<Way> {
+fn way(frames: &[Arc<Frame>], lower: usize, upper: usize, busy: &[FrameId]) -> Option<Passage> {
     if frames[lower + 1..upper].iter().all(|between| !share::shares(&frames[upper], between)) {
-        return Some(Way::Down);
+        return Some(Passage::Down);
     }
     let hand = share::examine(&frames[..upper], lower).ok()?;
     let (old, new) = (&frames[lower], &frames[upper]);
@@ -164,7 +164,7 @@ fn way(frames: &[Arc<Frame>], lower: usize, upper: usize, busy: &[FrameId]) -> O
             && !old.footprint.touches.iter().any(|touch| touch.serves == Some(slot))
     };
     let taken = hand.taken().all(again) && hand.slots.len() == hand.taken().count();
-    (taken && !hand.takers().any(|id| busy.contains(&id))).then_some(Way::Up(hand))
+    (taken && !hand.takers().any(|id| busy.contains(&id))).then_some(Passage::Up(hand))
 }
 
 /// What is left of a frame whose absolute writes of these slots others have taken over.

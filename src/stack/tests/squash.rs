@@ -1,0 +1,148 @@
+//! What is squashed, and what stays by itself.
+
+use super::*;
+
+fn at(configuration: &Configuration, requester: Requester) -> Op<'_> {
+    Op::Push { configuration, requester, at: Time(0), scope: None }
+}
+
+#[test]
+fn frames_of_active_states_are_never_squashed() {
+    let mut bench = Bench::new(3);
+    let of = |n: usize| conf(&format!("c{n}"), None, &[], vec![set("A.gain", n as f64)], &[]);
+    let scoped = of(1);
+    let request =
+        Op::Push { configuration: &scoped, requester: Requester::Operator, at: Time(0), scope: Some(Scope(1)) };
+    let kept = bench.ok(&[request]).1[0];
+    for n in 2..9 {
+        bench.ok(&[push(&of(n))]);
+    }
+    assert_eq!(bench.stack.len(), 3);
+    assert!(bench.stack.frame(kept).is_some_and(|f| !f.is_squashed()));
+    let squashed = &bench.stack.frames()[1];
+    assert_eq!((squashed.parts.len(), squashed.configuration.as_str()), (6, "c7"));
+    assert!(bench.stack.is_buried(ConfigId::new("c3").unwrap(), Some(Requester::Operator)));
+    // Left: popped from the bottom; the squashed frame takes its value over.
+    bench.ok(&[Op::Undo(kept)]);
+    bench.ok(&[Op::UndoTo(0)]);
+    assert_eq!(bench.value("A.gain"), 0.0);
+    // Nothing but active frames: refused.
+    let mut bench = Bench::new(2);
+    for n in 0..2 {
+        let conf = of(n);
+        bench.ok(&[Op::Push {
+            configuration: &conf,
+            requester: Requester::Operator,
+            at: Time(0),
+            scope: Some(Scope(1)),
+        }]);
+    }
+    assert_eq!(bench.codes(&[push(&of(3))]), ["stack::full"]);
+}
+
+#[test]
+fn the_safe_frame_in_force_is_squashed_last() {
+    let mut bench = Bench::new(3);
+    let safe = Configuration { safe: true, ..conf("safe", None, &[], vec![call("B.open")], &[]) };
+    let of = |n: usize| conf(&format!("c{n}"), None, &[], vec![set("A.gain", n as f64)], &[]);
+    let kept = bench.ok(&[push(&safe)]).1[0];
+    for n in 0..9 {
+        bench.ok(&[push(&of(n))]);
+    }
+    assert!(bench.stack.len() == 3 && bench.stack.frame(kept).is_some_and(|frame| !frame.is_squashed()));
+    // One that is never undone is in nobody's way.
+    let mut newest = kept;
+    for n in 0..9 {
+        bench.ok(&[push(&of(n))]);
+        newest = bench.ok(&[push(&safe)]).1[0];
+        assert!(bench.stack.len() <= 3);
+    }
+    bench.ok(&[push(&of(9))]);
+    assert!(bench.stack.frame(newest).is_some_and(|frame| !frame.is_squashed()));
+    bench.ok(&[Op::Undo(newest)]);
+}
+
+#[test]
+fn what_others_set_between_does_not_keep_frames_apart() {
+    let mut bench = Bench::new(3);
+    let by = |name: &str| Requester::Coordinator(ComponentName::new(name).unwrap());
+    let of = |id: &str, gain: usize, other: f64| {
+        conf(id, None, &[], vec![set("A.gain", gain as f64), set("B.gain", other)], &[])
+    };
+    for n in 0..8 {
+        bench.ok(&[at(&of("mode", n, 0.5), by("c"))]);
+        bench.ok(&[at(&conf("mine", None, &[], vec![set("A.gain", 10.0 + n as f64)], &[]), Requester::Operator)]);
+    }
+    assert_eq!(bench.stack.len(), 6);
+    // What the operator has set lately is there without what the coordinator did, and the other way about.
+    let all: Vec<FrameId> = bench.stack.frames().iter().map(|frame| frame.id).collect();
+    let whose = |bench: &Bench, id| bench.stack.frame(id).is_some_and(|frame| frame.requester == Requester::Operator);
+    for id in all.iter().rev().filter(|id| !whose(&bench, **id)).copied().collect::<Vec<_>>() {
+        bench.ok(&[Op::Undo(id)]);
+    }
+    assert_eq!((bench.value("A.gain"), bench.value("B.gain")), (17.0, 0.0));
+    bench.ok(&[Op::UndoTo(0)]);
+    assert_eq!(bench.value("A.gain"), 0.0);
+    // Written by the older one and between, not again by the newer one, which shares something else with what is between.
+    let mut bench = Bench::new(2);
+    let [low, high] =
+        [("low", "A.gain"), ("high", "B.gain")].map(|(id, of)| conf(id, None, &[], vec![set(of, 1.0)], &[]));
+    for own in [&low, &high] {
+        bench.ok(&[at(own, by("c"))]);
+        bench.ok(&[at(&of("mine", 2, 2.0), Requester::Operator)]);
+    }
+    let refused = bench.ask(&[at(&low, by("c"))]).unwrap_err();
+    let finding = &refused.findings[0];
+    assert_eq!(
+        (finding.code.0, finding.help.as_deref().unwrap_or_default()),
+        (
+            "stack::full",
+            "undo or commit `mine` (a frame of operator), which lies between two of them, or raise `limits: { stack: … }` in the deployment"
+        )
+    );
+}
+
+#[test]
+fn calls_that_pile_up_become_a_floor() {
+    let mut bench = Bench::new(2);
+    for n in 0..crate::limits::SQUASHED_CALLS + 4 {
+        bench.ok(&[push(&conf(&format!("c{}", n % 8), None, &[], vec![call("A.open")], &[]))]);
+    }
+    let oldest = &bench.stack.frames()[0];
+    assert!(oldest.floor.as_ref().is_some_and(|why| why.contains("operation calls")));
+    bench.ok(&[Op::UndoTop]);
+    assert_eq!(bench.codes(&[Op::UndoTop]), ["stack::floor"]);
+}
+
+#[test]
+fn a_switch_to_and_fro_stays_bounded_when_squashed() {
+    let mut bench = Bench::new(2);
+    let (stopped, running) = ([("A", Wanted::Stopped)], [("A", Wanted::Running)]);
+    for n in 0..200 {
+        bench.ok(&[push(&conf("c", None, &stopped, vec![set("A.mass", f64::from(n % 3))], &running))]);
+    }
+    let super::super::Inverse::List(list) = &bench.stack.frames()[0].inverse else { panic!("it is squashed") };
+    assert_eq!(
+        list.iter().map(|i| i.step.to_string()).collect::<Vec<_>>(),
+        ["stop A", "property_set A.mass = 0.0", "start A"]
+    );
+}
+
+#[test]
+fn a_frame_that_waits_for_its_confirmation_is_not_squashed() {
+    let mut bench = Bench::new(2);
+    let mut waits = conf("waits", None, &[], vec![set("A.gain", 1.0)], &[]);
+    let event = EventName::new("e_fine").unwrap();
+    waits.confirm = Some(Confirm { event, within: std::time::Duration::from_secs(1) });
+    let plain = conf("plain", None, &[], vec![set("B.gain", 1.0)], &[]);
+    let more = conf("more", None, &[], vec![set("B.mass", 1.0)], &[("B", Wanted::Stopped)]);
+    let more = Configuration { pre: more.post.clone(), ..more };
+    assert!(bench.ask(&[push(&waits)]).unwrap().parts[0].edits.waits);
+    let held = bench.ok(&[push(&waits)]).1;
+    let second = bench.ask(&[push(&plain)]).unwrap();
+    bench.stack.apply(second.parts.iter().map(|part| &part.edits), &held);
+    let third = bench.ask(&[push(&more)]).unwrap();
+    bench.stack.apply(third.parts.iter().map(|part| &part.edits), &held);
+    let parts: Vec<usize> = bench.stack.frames().iter().map(|frame| frame.parts.len()).collect();
+    assert_eq!(parts, [0, 2], "it stays by itself");
+}
