@@ -9,6 +9,7 @@ deploy("../../deployments/youbot_coupling.yaml")
 for _, net in ipairs{ "To_Right", "To_Left" } do set(net .. ".delay", delay, { force = true, within = 1 }) end
 
 local ROBOTS, AXES = { "left", "right" }, { "x", "y", "z" }
+local WORLD = { left = "World.robot1_", right = "World.robot2_" }
 local function both(event) for _, robot in ipairs(ROBOTS) do raise(robot .. "/" .. event) end end
 local function until_both(state, seconds) for _, robot in ipairs(ROBOTS) do wait_state(robot .. ":" .. state, seconds) end end
 local function hand(script) set("left/Operator.script", script, { force = true, within = 1 }) end
@@ -16,7 +17,7 @@ local function hand(script) set("left/Operator.script", script, { force = true, 
 local function measure(name, seconds, bounds)
   local signals = {}
   for _, robot in ipairs(ROBOTS) do
-    for i, axis in ipairs(AXES) do signals[robot .. "_" .. axis] = robot .. "/World.robot1_tool_pose.p[" .. i - 1 .. "]" end
+    for i, axis in ipairs(AXES) do signals[robot .. "_" .. axis] = WORLD[robot] .. "tool_pose.p[" .. i - 1 .. "]" end
     signals[robot .. "_active"] = robot .. "/Cart_Impedance.active"
     signals[robot .. "_limit"] = robot .. "/Dynamics.tau_sat"
   end

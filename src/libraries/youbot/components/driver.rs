@@ -11,6 +11,10 @@ use crate::runtime::{Builder, Component, Context, EventOut, Failure, In, Operati
 
 /// An arm that was not heard for so long is not there any more: the field bus has failed, in s.
 const BUS_TIMEOUT: f64 = 0.02;
+/// An arm that has not been heard at all is waited for so long by who wants it to move, in s.
+const BUS_UP: f64 = 1.0;
+/// Why nothing moves before that.
+const NO_ARM: &str = "the arm has not been heard yet (plant_state): nothing answers on the field bus";
 /// Drives that take torques are watched: when whoever does was not heard for so long it has stopped, in s.
 const UNWATCHED: f64 = 0.04;
 /// What lasts is told again so much later, as monitors do it: who was elsewhere when it began still hears of it. In s.
@@ -94,6 +98,10 @@ pub struct Driver {
     counters: Encoders,
     heat: HeatLimit,
     running: bool,
+    /// Whether the arm has been heard since it was started. Until then the drives are off, and nothing has failed.
+    arm_is_there: bool,
+    /// For how long a calibration has waited for the arm, in s.
+    waits_for_arm: Option<f64>,
     motors: MotorStates,
     bus: DriverState,
     task: Option<Ticket>,
@@ -109,7 +117,8 @@ impl Component for Driver {
     fn new(b: &mut Builder<Self>) -> Self {
         b.describe(
             "The youBot's driver: of an arm and a base that are in youbot.World. Drives start off; the arm then rests on its \
-             stops or sinks onto them. An arm that is not heard any more for 20 ms: e_EC_TIMEOUT.",
+             stops or sinks onto them. It may be started before its arm is there: the first to ask for it, the calibration, waits for it \
+             for a second. An arm that is not heard any more for 20 ms: e_EC_TIMEOUT.",
         )
         .actuator()
         .exclusive("ethercat:{ifname}")
@@ -124,19 +133,20 @@ impl Component for Driver {
             }
             Ok(())
         })
-        .on_start(|c, _| {
-            let Some(state) = c.plant_state.get() else {
-                return Err("the arm is not heard (plant_state): start the world that it is in first".into());
-            };
-            c.drives.measured = Measured { q: state.pos.into(), qd: state.vel.into() };
-            c.plant = state;
+        .on_start(|c, cx| {
+            let heard = aged(&mut c.plant_state, cx).filter(|(_, age)| *age <= BUS_TIMEOUT);
+            c.arm_is_there = heard.is_some();
+            if let Some((state, _)) = heard {
+                c.drives.measured = Measured { q: state.pos.into(), qd: state.vel.into() };
+                c.plant = state;
+            }
             c.running = true;
-            (c.unwatched, c.unheard) = (None, None);
+            (c.unwatched, c.unheard, c.waits_for_arm) = (None, None, None);
             Ok(())
         })
         .on_stop(|c, _| {
             c.running = false;
-            c.task = None;
+            (c.task, c.waits_for_arm) = (None, None);
             if !c.drives.switch_off() {
                 c.events.raise(c.names.dropped);
             }
@@ -146,14 +156,21 @@ impl Component for Driver {
         b.doc("Changes what the drives do: 0 off, 1 hold a position, 6 take torques.").operation(
             "setControlMode",
             |c, _, (mode,): (u8,)| match DriveMode::from_number(mode) {
+                Some(mode) if mode != DriveMode::MotorStop && !c.arm_is_there => OperationAnswer::failed(NO_ARM),
                 Some(mode) => c.drives.set_mode(mode).map_or_else(OperationAnswer::failed, OperationAnswer::Done),
                 None => OperationAnswer::failed(format!("no control mode {mode}: 0, 1 or 6")),
             },
         );
-        b.doc("Finds the stops of joints 2 to 4; ends resting on them, drives off. Takes seconds.")
+        b.doc("Finds the stops of joints 2 to 4; ends resting on them, drives off. Takes seconds. Waits for the arm for a second.")
             .no_effect()
             .moves()
-            .operation("start_calibration", |c, cx, (): ()| c.begin(cx, Drives::calibrate));
+            .operation("start_calibration", |c, cx, (): ()| match c.arm_is_there || !c.running {
+                true => c.begin(cx, Drives::calibrate),
+                false => {
+                    (c.task, c.waits_for_arm) = (Some(cx.ticket()), Some(0.0));
+                    OperationAnswer::Pending
+                }
+            });
         b.doc("Moves the arm from its stops to the working pose and holds it there. Takes seconds.")
             .undone_by("fold")
             .moves()
@@ -178,7 +195,7 @@ impl Component for Driver {
             "emergency_stop",
             |c, _, (): ()| {
                 c.task = None;
-                c.drives.hold();
+                c.hold();
                 c.events.raise(c.names.emergency);
                 OperationAnswer::Done(())
             },
@@ -202,7 +219,10 @@ impl Component for Driver {
              brake and were not released.",
         )
         .no_effect()
-        .operation("resume", |c, _, (): ()| c.drives.resume().map_or_else(OperationAnswer::failed, OperationAnswer::Done));
+        .operation("resume", |c, _, (): ()| match c.arm_is_there {
+            true => c.drives.resume().map_or_else(OperationAnswer::failed, OperationAnswer::Done),
+            false => OperationAnswer::failed(NO_ARM),
+        });
         b.doc("The drives take torques again if they did before they braked, for whatever reason; else they hold on.")
             .undone_by("brake")
             .operation("release", |c, _, (): ()| {
@@ -296,6 +316,8 @@ impl Component for Driver {
             },
             drives: Drives::new(radians(PARK_POSE_DEG)),
             running: false,
+            arm_is_there: false,
+            waits_for_arm: None,
             motors: MotorStates::default(),
             bus: DriverState::default(),
             task: None,
@@ -323,6 +345,9 @@ impl Component for Driver {
         let effort = aged(&mut self.effort, cx);
         let twist = aged(&mut self.cmd_twist, cx).map(|(t, age)| (t.into(), age));
         let (plant, age) = aged(&mut self.plant_state, cx).unwrap_or((self.plant, f64::INFINITY));
+        if !self.arm_is_there && !self.finds_arm(age <= BUS_TIMEOUT, cx.dt()) {
+            return;
+        }
         self.plant = plant;
         self.unheard = self.again(age > BUS_TIMEOUT, self.unheard, cx.dt(), |c| _ = c.fail("ec_timeout"));
         let _ = self.gripper.take();
@@ -386,6 +411,9 @@ impl Driver {
         if !self.running {
             return OperationAnswer::failed("the driver is not running");
         }
+        if !self.arm_is_there {
+            return OperationAnswer::failed(NO_ARM);
+        }
         match f(&mut self.drives) {
             Ok(()) => {
                 self.task = Some(cx.ticket());
@@ -393,6 +421,42 @@ impl Driver {
             }
             Err(why) => OperationAnswer::failed(why),
         }
+    }
+
+    /// Drives that have not heard their arm do not know where to hold it: they stay off.
+    fn hold(&mut self) {
+        if self.arm_is_there {
+            self.drives.hold();
+        }
+    }
+
+    /// Before the arm has been heard: the drives stay off, and all that is written is how they are. Whether it is `heard` now.
+    fn finds_arm(&mut self, heard: bool, dt: f64) -> bool {
+        self.arm_is_there = heard;
+        if self.task.as_ref().is_some_and(Ticket::is_cancelled) {
+            (self.task, self.waits_for_arm) = (None, None);
+        }
+        if let Some(waited) = self.waits_for_arm.take() {
+            let outcome = match heard {
+                true => self.drives.calibrate(),
+                false if waited < BUS_UP => {
+                    self.waits_for_arm = Some(waited + dt);
+                    Ok(())
+                }
+                false => Err(NO_ARM),
+            };
+            if let Err(why) = outcome
+                && let Some(ticket) = self.task.take()
+            {
+                ticket.failed(why);
+            }
+        }
+        if !heard {
+            self.motor_states.write(self.motors);
+            self.driver_state.write(self.bus);
+            self.control_mode.write(self.drives.mode().number());
+        }
+        heard
     }
 
     /// Tells what is so, and tells it again as long as it lasts; since when it was told last, in s.
@@ -412,7 +476,7 @@ impl Driver {
         self.motors.error_flags |= FAULTS[i].2;
         self.bus.pd_recv_err += i64::from(wanted == "ec_timeout");
         // How far a motion under way came nobody knows: it does not answer that it failed, but ends when it is given up.
-        self.drives.hold();
+        self.hold();
         self.events.raise(self.names.faults[i]);
         true
     }
