@@ -38,6 +38,7 @@ mod failing;
 mod follow;
 mod heard;
 mod held;
+mod ignored;
 mod inbox;
 mod interface;
 mod interned;
