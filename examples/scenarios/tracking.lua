@@ -15,7 +15,7 @@ local function until_both(state, seconds) for _, robot in ipairs(ROBOTS) do wait
 local function hand(script) set("left/Operator.script", script, { force = true, within = 1 }) end
 
 local function measure(name, seconds, bounds)
-  local signals = {}
+  local signals = { energy = "Observer.energy" }
   for _, robot in ipairs(ROBOTS) do
     for i, axis in ipairs(AXES) do signals[robot .. "_" .. axis] = WORLD[robot] .. "tool_pose.p[" .. i - 1 .. "]" end
     signals[robot .. "_active"] = robot .. "/Cart_Impedance.active"
@@ -41,6 +41,9 @@ local function measure(name, seconds, bounds)
   figure{ name = name .. ": hand, peak", value = peak, unit = "N" }
   expect{ name = name .. ": copying", value = 100 * math.min(s:mean("left_active"), s:mean("right_active")), min = 100, unit = "%" }
   expect{ name = name .. ": joints at a limit", value = math.max(s:max("left_limit"), s:max("right_limit")), max = 0 }
+  -- What the coupling takes in at both tools, less what it gives out, the networks between them included.
+  figure{ name = name .. ": taken in", value = s:last("energy") - v.energy[1], unit = "J" }
+  expect{ name = name .. ": more given out than taken in and held", value = signal("Observer.violated") and 1 or 0, max = 0 }
   expect{ name = name .. ": led by", value = s:max("left_x") - s:min("left_x"), min = bounds.led or 0.06, unit = "m" }
 end
 

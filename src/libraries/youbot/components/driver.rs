@@ -1,5 +1,9 @@
 //! `youbot.Driver`: the robot's driver.
 
+mod bus;
+mod faults;
+mod operations;
+
 use super::aged;
 use super::samples::{DriverState, JointState, MotorStates, Odometry, PlantCommand, PlantState, Twist, stamp};
 use crate::libraries::youbot::drives::{DriveHappening, DriveMode, DriveOutput, DriveParameters, Drives, Measured};
@@ -7,14 +11,10 @@ use crate::libraries::youbot::motors::{Encoders, HeatChange, HeatLimit};
 use crate::libraries::youbot::parameters::{GEAR, JOINTS, PARK_POSE_DEG, TORQUE_CONSTANT, TORQUE_LIMIT};
 use crate::libraries::youbot::rigid_body::{J5, radians};
 use crate::model::{EventName, Tunable};
-use crate::runtime::{Builder, Component, Context, EventOut, Failure, In, OperationAnswer, Out, Prop, Ticket};
+use crate::runtime::{Builder, Component, Context, EventOut, In, Out, Prop, Ticket};
+use bus::BUS_TIMEOUT;
+use faults::{FAULTS, I2T};
 
-/// An arm that was not heard for so long is not there any more: the field bus has failed, in s.
-const BUS_TIMEOUT: f64 = 0.02;
-/// An arm that has not been heard at all is waited for so long by who wants it to move, in s.
-const BUS_UP: f64 = 1.0;
-/// Why nothing moves before that.
-const NO_ARM: &str = "the arm has not been heard yet (plant_state): nothing answers on the field bus";
 /// Drives that take torques are watched: when whoever does was not heard for so long it has stopped, in s.
 const UNWATCHED: f64 = 0.04;
 /// What lasts is told again so much later, as monitors do it: who was elsewhere when it began still hears of it. In s.
@@ -23,35 +23,6 @@ const AGAIN: f64 = 0.5;
 const HEATING: f64 = 1.5;
 const HEAT_TIME: f64 = 120.0;
 const AMBIENT: f64 = 25.0;
-
-/// The fault of a motor that gave too much for too long.
-const I2T: &str = "i2t";
-
-/// Faults that `comm_fault` injects: the property's value, the event, the flag.
-const FAULTS: [(&str, &str, i64); 9] = [
-    ("overcurrent", "e_OVERCURRENT", 0x01),
-    ("undervoltage", "e_UNDERVOLTAGE", 0x02),
-    ("hall", "e_HALL_ERR", 0x10),
-    ("sine_comm", "e_SINE_COMM_INIT_ERR", 0x100),
-    (I2T, "e_I2T_EXCEEDED", 0x200),
-    ("overtemp", "e_OVERTEMP", 0x04),
-    ("ec_timeout", "e_EC_TIMEOUT", 0x40),
-    ("encoder", "e_ENCODER_ERR", 0x20),
-    ("emergency", "e_EMERGENCY_STOP", 0x80),
-];
-
-/// What each of them is, for `davit types`.
-const FAULT_WORDS: [&str; FAULTS.len()] = [
-    "A motor takes too much current; the drives hold, e_OVERCURRENT.",
-    "The drives have too little voltage; they hold, e_UNDERVOLTAGE.",
-    "A Hall sensor fails; the drives hold, e_HALL_ERR.",
-    "A motor does not find its commutation; the drives hold, e_SINE_COMM_INIT_ERR.",
-    "A motor has taken much current for long; the drives hold, e_I2T_EXCEEDED.",
-    "A motor is too hot; the drives hold, e_OVERTEMP.",
-    "The field bus did not answer in time; the drives hold, e_EC_TIMEOUT.",
-    "An encoder tells nonsense; the drives hold, e_ENCODER_ERR.",
-    "Somebody pressed the emergency stop; the drives hold, e_EMERGENCY_STOP.",
-];
 
 struct Events {
     soft_limit: EventName,
@@ -153,96 +124,7 @@ impl Component for Driver {
             c.plant_command.write(PlantCommand { braked: true, ..PlantCommand::default() });
             Ok(())
         });
-        b.doc("Changes what the drives do: 0 off, 1 hold a position, 6 take torques.").operation(
-            "setControlMode",
-            |c, _, (mode,): (u8,)| match DriveMode::from_number(mode) {
-                Some(mode) if mode != DriveMode::MotorStop && !c.arm_is_there => OperationAnswer::failed(NO_ARM),
-                Some(mode) => c.drives.set_mode(mode).map_or_else(OperationAnswer::failed, OperationAnswer::Done),
-                None => OperationAnswer::failed(format!("no control mode {mode}: 0, 1 or 6")),
-            },
-        );
-        b.doc("Finds the stops of joints 2 to 4; ends resting on them, drives off. Takes seconds. Waits for the arm for a second.")
-            .no_effect()
-            .moves()
-            .operation("start_calibration", |c, cx, (): ()| match c.arm_is_there || !c.running {
-                true => c.begin(cx, Drives::calibrate),
-                false => {
-                    (c.task, c.waits_for_arm) = (Some(cx.ticket()), Some(0.0));
-                    OperationAnswer::Pending
-                }
-            });
-        b.doc("Moves the arm from its stops to the working pose and holds it there. Takes seconds.")
-            .undone_by("fold")
-            .moves()
-            .operation("unfold", |c, cx, (): ()| c.begin(cx, Drives::unfold));
-        b.doc("Moves the arm onto its stops. Takes seconds.")
-            .undone_by("unfold")
-            .moves()
-            .operation("fold", |c, cx, (): ()| c.begin(cx, Drives::fold));
-        b.doc(
-            "Has a fault happen once, by its name in comm_fault: as the world does it, with nothing written that would be a difference.",
-        )
-        .no_effect()
-        .operation("inject_fault", |c, _, (fault,): (String,)| match c.fail(&fault) {
-            true => OperationAnswer::Done(()),
-            false => OperationAnswer::failed(format!("no fault `{fault}`")),
-        });
-        b.doc("Forgets the drives' error flags.").no_effect().operation("clear_faults", |c, _, (): ()| {
-            c.motors.error_flags = 0;
-            OperationAnswer::Done(())
-        });
-        b.doc("The drives hold where they are, whatever is commanded; raises e_EMERGENCY_STOP.").no_effect().operation(
-            "emergency_stop",
-            |c, _, (): ()| {
-                c.task = None;
-                c.hold();
-                c.events.raise(c.names.emergency);
-                OperationAnswer::Done(())
-            },
-        );
-        b.doc("Whatever moves comes to rest along a ramp and is held there; the base stands.")
-            .undone_by("release")
-            .operation("brake", |c, _, (): ()| {
-                c.task = None;
-                c.drives.brake();
-                OperationAnswer::Done(())
-            });
-        b.doc("The same, and nothing takes it back: for what moves although they were braked before.")
-            .no_effect()
-            .operation("stop", |c, _, (): ()| {
-                c.task = None;
-                c.drives.stop();
-                OperationAnswer::Done(())
-            });
-        b.doc(
-            "The drives take torques, as mode 6 which was set before says: for after they held by themselves. Fails while they \
-             brake and were not released.",
-        )
-        .no_effect()
-        .operation("resume", |c, _, (): ()| match c.arm_is_there {
-            true => c.drives.resume().map_or_else(OperationAnswer::failed, OperationAnswer::Done),
-            false => OperationAnswer::failed(NO_ARM),
-        });
-        b.doc("The drives take torques again if they did before they braked, for whatever reason; else they hold on.")
-            .undone_by("brake")
-            .operation("release", |c, _, (): ()| {
-                c.drives.release();
-                OperationAnswer::Done(())
-            });
-        b.doc("Whether torques are passed on also near the joints' limits.").operation(
-            "disable_jntlim_safety",
-            |c, _, (off,): (bool,)| {
-                c.drives.limit_safety = !off;
-                OperationAnswer::Done(())
-            },
-        );
-        for (fault, what) in FAULTS.iter().zip(FAULT_WORDS) {
-            let name = fault.0;
-            b.doc(what).injection(name, move |c, _, (): ()| match c.fail(name) {
-                true => Ok(()),
-                false => Err(Failure(format!("no fault `{name}`"))),
-            });
-        }
+        Self::offer_operations(b);
         let p = DriveParameters::default();
         Self {
             effort: b.doc("Torques, heard in mode 6.").unit("N m").input("joint_effort_command"),
@@ -406,59 +288,6 @@ impl Component for Driver {
 }
 
 impl Driver {
-    /// Begins something that takes many updates; its ticket answers when it has ended.
-    fn begin(&mut self, cx: &mut Context, f: fn(&mut Drives) -> Result<(), &'static str>) -> OperationAnswer {
-        if !self.running {
-            return OperationAnswer::failed("the driver is not running");
-        }
-        if !self.arm_is_there {
-            return OperationAnswer::failed(NO_ARM);
-        }
-        match f(&mut self.drives) {
-            Ok(()) => {
-                self.task = Some(cx.ticket());
-                OperationAnswer::Pending
-            }
-            Err(why) => OperationAnswer::failed(why),
-        }
-    }
-
-    /// Drives that have not heard their arm do not know where to hold it: they stay off.
-    fn hold(&mut self) {
-        if self.arm_is_there {
-            self.drives.hold();
-        }
-    }
-
-    /// Before the arm has been heard: the drives stay off, and all that is written is how they are. Whether it is `heard` now.
-    fn finds_arm(&mut self, heard: bool, dt: f64) -> bool {
-        self.arm_is_there = heard;
-        if self.task.as_ref().is_some_and(Ticket::is_cancelled) {
-            (self.task, self.waits_for_arm) = (None, None);
-        }
-        if let Some(waited) = self.waits_for_arm.take() {
-            let outcome = match heard {
-                true => self.drives.calibrate(),
-                false if waited < BUS_UP => {
-                    self.waits_for_arm = Some(waited + dt);
-                    Ok(())
-                }
-                false => Err(NO_ARM),
-            };
-            if let Err(why) = outcome
-                && let Some(ticket) = self.task.take()
-            {
-                ticket.failed(why);
-            }
-        }
-        if !heard {
-            self.motor_states.write(self.motors);
-            self.driver_state.write(self.bus);
-            self.control_mode.write(self.drives.mode().number());
-        }
-        heard
-    }
-
     /// Tells what is so, and tells it again as long as it lasts; since when it was told last, in s.
     fn again(&mut self, so: bool, told: Option<f64>, dt: f64, tell: impl FnOnce(&mut Self)) -> Option<f64> {
         let told = told.map(|since| since + dt).filter(|since| *since < AGAIN);
@@ -468,17 +297,6 @@ impl Driver {
                 0.0
             })
         })
-    }
-
-    /// A fault of that name happens; false: there is none.
-    fn fail(&mut self, wanted: &str) -> bool {
-        let Some(i) = FAULTS.iter().position(|(name, ..)| *name == wanted) else { return false };
-        self.motors.error_flags |= FAULTS[i].2;
-        self.bus.pd_recv_err += i64::from(wanted == "ec_timeout");
-        // How far a motion under way came nobody knows: it does not answer that it failed, but ends when it is given up.
-        self.hold();
-        self.events.raise(self.names.faults[i]);
-        true
     }
 
     fn publish(&mut self, plant: &PlantState, driven: &DriveOutput, cx: &Context) {
