@@ -3,7 +3,7 @@
 
 use super::product::Product;
 use super::reactions::Emitted;
-use super::seldom::Offered;
+use super::seldom::RaisedForChild;
 use super::state::{ProductState, bit, index};
 use crate::model::EventName;
 use crate::model::subsystem::IGNORED;
@@ -24,7 +24,7 @@ impl Product<'_> {
             return;
         }
         let waits = hearers.iter().fold(0, |waits, (number, _)| waits | bit(usize::from(*number)));
-        state.change(|seldom| seldom.offered.push(Offered { event, by: index(by), owner, waits }));
+        state.change(|seldom| seldom.offered.push(RaisedForChild { event, by: index(by), owner, waits }));
         if waits == 0 {
             self.tells_ignored(state, by, event);
         }
@@ -36,19 +36,21 @@ impl Product<'_> {
             return;
         }
         let Some(name) = self.members[number].name_of(event) else { return };
-        let heard = |of: &Offered| of.waits == 0 && of.by == index(number) && self.ignored(number, of.event) == event;
+        let heard =
+            |of: &RaisedForChild| of.waits == 0 && of.by == index(number) && self.ignored(number, of.event) == event;
         if let Some(at) = state.offered.iter().position(heard) {
             state.change(|seldom| seldom.offered.remove(at));
             return;
         }
-        let comes = |of: &Offered| of.event == name && of.waits & bit(number) != 0;
+        let comes = |of: &RaisedForChild| of.event == name && of.waits & bit(number) != 0;
         let taken = self.members[number].react(state.leaves[number], event).taken;
         for _ in 0..times {
             let Some(at) = state.offered.iter().position(comes) else { return };
             let offered = state.offered[at];
             let waits = offered.waits & !bit(number);
             let kept = state.offered.iter().enumerate().filter(|(place, _)| !taken || *place != at);
-            let kept = kept.map(|(place, of)| if place == at { Offered { waits, ..*of } } else { *of }).collect();
+            let kept =
+                kept.map(|(place, of)| if place == at { RaisedForChild { waits, ..*of } } else { *of }).collect();
             state.change(|seldom| seldom.offered = kept);
             if !taken && waits == 0 {
                 self.tells_ignored(state, usize::from(offered.by), name);
@@ -58,7 +60,7 @@ impl Product<'_> {
 
     /// States of a coordinator are left: nobody hears any more what they would have been told.
     pub(super) fn forgets_offered(&self, state: &mut ProductState, by: usize, left: &[NodeId]) {
-        let gone = |of: &Offered| of.by == index(by) && left.contains(&of.owner);
+        let gone = |of: &RaisedForChild| of.by == index(by) && left.contains(&of.owner);
         while let Some(at) = state.offered.iter().position(gone) {
             let offered = state.change(|seldom| seldom.offered.remove(at));
             let told = (index(by), self.ignored(by, offered.event));

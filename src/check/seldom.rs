@@ -32,7 +32,7 @@ pub struct Unconfirmed {
 
 /// An event that a parent's coordinator has raised for a subsystem, until it was taken, or that it was ignored was heard.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct Offered {
+pub struct RaisedForChild {
     /// The event.
     pub event: EventName,
     /// The coordinator that raised it.
@@ -71,7 +71,7 @@ pub struct Seldom {
     /// Coordinators that have moved since the inboxes were empty, by their bits. Kept only where events come meanwhile.
     pub moved: u64,
     /// Events that were raised for subsystems and are not taken yet. Kept only where these are followed with their parent.
-    pub offered: SharedList<Offered>,
+    pub offered: SharedList<RaisedForChild>,
 }
 
 /// Nothing of it.

@@ -32,7 +32,7 @@ fn a_plan_tells_a_parent_what_its_subsystem_ignored() {
         ),
     );
     let down = demo.run(&["plan", "cell.yaml", "--shutdown"]);
-    assert!(down.code == 1 && down.err.contains("stops at `root.later`"), "{}{}", down.out, down.err);
+    assert!(down.code == 1 && down.err.contains("stops at `cell:root.later`"), "{}{}", down.out, down.err);
 
     // What is taken is not answered.
     let waits = COORDINATOR.replace(
@@ -41,5 +41,5 @@ fn a_plan_tells_a_parent_what_its_subsystem_ignored() {
     );
     demo.write("cell_coordinator.lua", &waits);
     let down = demo.run(&["plan", "cell.yaml", "--shutdown"]);
-    assert!(down.code == 1 && down.err.contains("stops at `root.lowering`"), "{}{}", down.out, down.err);
+    assert!(down.code == 1 && down.err.contains("stops at `cell:root.lowering`"), "{}{}", down.out, down.err);
 }
