@@ -50,7 +50,7 @@ pub fn part(deployment: &Deployment, catalogue: &Catalogue, severity: Severity) 
     }
     let universe = Universe::new(deployment, catalogue);
     let needs = |of: MemberRef| {
-        let types = universe.of(of.component).into_iter().filter_map(|creation| creation.description.as_deref());
+        let types = universe.of(of.component).iter().filter_map(|creation| creation.description.as_deref());
         let mut ports = types.flat_map(|ty| &ty.ports).filter(|(name, _)| **name == of.member);
         ports.any(|(_, port)| port.direction == Direction::In && port.required)
     };
