@@ -98,8 +98,8 @@ pub struct SourceMap {
     speller: Option<Speller>,
 }
 
-/// What a text is in a finding about a file of YAML: the examples in it, which stand between backticks, are written as Lua has them.
-pub type Speller = fn(&str) -> String;
+/// What a text is in a finding about a file of that language: the examples in it, which stand between backticks, are written as Lua has them.
+pub type Speller = fn(Language, &str) -> String;
 
 impl Default for SourceMap {
     fn default() -> Self {
@@ -122,12 +122,13 @@ impl SourceMap {
     /// which can only be YAML, in that of the files that it names.
     pub fn told<'t>(&self, at: Origin, text: &'t str) -> Cow<'t, str> {
         let lua = || self.files.iter().any(|file| file.language == Language::Lua);
-        let is_yaml = || {
-            self.base(at)
-                .is_some_and(|(file, _)| self.file(file).language == Language::Yaml && !(file == FileId(0) && lua()))
+        let language = || {
+            let (file, _) = self.base(at)?;
+            let language = self.file(file).language;
+            (!(language == Language::Lua || file == FileId(0) && lua())).then_some(language)
         };
-        match self.speller {
-            Some(speller) if text.contains('`') && is_yaml() => Cow::Owned(speller(text)),
+        match (self.speller, text.contains('`').then(language).flatten()) {
+            (Some(speller), Some(language)) => Cow::Owned(speller(language, text)),
             _ => Cow::Borrowed(text),
         }
     }

@@ -8,6 +8,7 @@
 mod compose;
 mod concern;
 mod convert;
+mod example;
 mod files;
 pub mod grammar;
 mod left_out;
@@ -20,6 +21,7 @@ pub mod schema;
 mod scxml;
 mod slips;
 mod spelling;
+mod spelling_xml;
 mod texts;
 mod tree;
 mod trusted;

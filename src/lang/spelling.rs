@@ -1,20 +1,12 @@
 //! Examples in the language of the file that they are shown for. They are written as Lua has them; what is spelt the same in both
 //! (a name, a number), or is YAML already, stays as it is.
 
+use super::example::{ExampleValue, parse, told};
 use super::grammar::{Primitive, primitive};
-use super::words::{CONDITIONS, SIGNALS};
 
 /// An example of Lua as YAML spells it; none: it is no key with a value, no call and no table.
 pub fn as_yaml(example: &str) -> Option<String> {
-    let mut reader = ExampleParser { rest: example.trim() };
-    let mut entries = Vec::new();
-    loop {
-        entries.push(reader.entry()?);
-        match reader.rest {
-            "" => break,
-            _ => reader.skip(",")?,
-        }
-    }
+    let entries = parse(example)?;
     match &entries[..] {
         [(None, ExampleValue::Name(_) | ExampleValue::Text(_))] => None,
         [(None, alone)] => Some(match alone.change() {
@@ -28,46 +20,7 @@ pub fn as_yaml(example: &str) -> Option<String> {
 
 /// A text with examples of Lua in it, between backticks, as it is told of a file in YAML.
 pub fn told_in_yaml(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for (at, part) in text.split('`').enumerate() {
-        if at > 0 {
-            out.push('`');
-        }
-        match is_example(part).then(|| as_yaml(part)).flatten().filter(|_| at % 2 == 1) {
-            Some(spelt) => out.push_str(&spelt),
-            None => out.push_str(part),
-        }
-    }
-    out
-}
-
-/// Whether what is quoted is an example: keys with values, a table, or what a word of the language makes. Steps as plans print them,
-/// time events and calls of operations are written alike in both languages.
-fn is_example(text: &str) -> bool {
-    let mut reader = ExampleParser { rest: text.trim() };
-    match reader.entry() {
-        Some((Some(key), _)) => !key.contains(['.', '-']),
-        Some((None, ExampleValue::Call(word, _))) => is_word(&word),
-        Some((None, ExampleValue::Table(_))) => true,
-        _ => false,
-    }
-}
-
-fn is_word(word: &str) -> bool {
-    let made =
-        ["state", "trans", "transition", "conn", "Configuration", "ConfiguratorConf", "monitor", "Monitors", "undo"];
-    primitive(word).is_some()
-        || made.contains(&word)
-        || CONDITIONS.iter().chain(SIGNALS).any(|known| known.name == word)
-}
-
-/// A value.
-enum ExampleValue {
-    /// A name, a number: as it stands.
-    Name(String),
-    Text(String),
-    Table(Vec<(Option<String>, ExampleValue)>),
-    Call(String, Vec<(Option<String>, ExampleValue)>),
+    told(text, as_yaml)
 }
 
 impl ExampleValue {
@@ -145,87 +98,10 @@ fn inside(entries: &[(Option<String>, ExampleValue)]) -> String {
     entries.iter().map(one).collect::<Vec<_>>().join(", ")
 }
 
-struct ExampleParser<'t> {
-    rest: &'t str,
-}
-
-impl<'t> ExampleParser<'t> {
-    /// Goes past a mark and the blanks behind it.
-    fn skip(&mut self, mark: &str) -> Option<()> {
-        self.rest = self.rest.strip_prefix(mark)?.trim_start();
-        Some(())
-    }
-
-    /// A value, with its key where it has one.
-    fn entry(&mut self) -> Option<(Option<String>, ExampleValue)> {
-        if self.rest.starts_with('[') {
-            // A key that is no name in Lua.
-            self.skip("[")?;
-            let ExampleValue::Text(key) = self.value()? else { return None };
-            self.skip("]")?;
-            self.skip("=")?;
-            return Some((Some(key), self.value()?));
-        }
-        let value = self.value()?;
-        match value {
-            ExampleValue::Name(key) if self.rest.starts_with('=') => {
-                self.skip("=")?;
-                Some((Some(key), self.value()?))
-            }
-            value => Some((None, value)),
-        }
-    }
-
-    fn entries(&mut self, open: &str, close: &str) -> Option<Vec<(Option<String>, ExampleValue)>> {
-        self.skip(open)?;
-        let mut entries = Vec::new();
-        while self.skip(close).is_none() {
-            if !entries.is_empty() {
-                self.skip(",")?;
-            }
-            entries.push(self.entry()?);
-        }
-        Some(entries)
-    }
-
-    fn value(&mut self) -> Option<ExampleValue> {
-        if let Some(quote) = self.rest.chars().next().filter(|c| matches!(c, '"' | '\'')) {
-            let (text, rest) = self.rest[1..].split_once(quote)?;
-            self.rest = rest.trim_start();
-            return Some(ExampleValue::Text(text.to_owned()));
-        }
-        if self.rest.starts_with('{') {
-            return Some(ExampleValue::Table(self.entries("{", "}")?));
-        }
-        let mut value = self.word()?;
-        // What a method is called on comes first.
-        while self.rest.starts_with(':') {
-            self.skip(":")?;
-            let ExampleValue::Call(word, mut entries) = self.word()? else { return None };
-            entries.insert(0, (None, value));
-            value = ExampleValue::Call(word, entries);
-        }
-        Some(value)
-    }
-
-    /// A name or a number, or what is made with a word.
-    fn word(&mut self) -> Option<ExampleValue> {
-        let is_part = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '.' | '-' | '…');
-        let end = self.rest.find(|c| !is_part(c)).unwrap_or(self.rest.len());
-        let (word, rest) = self.rest.split_at(end);
-        self.rest = rest.trim_start();
-        match self.rest.chars().next() {
-            _ if word.is_empty() => None,
-            Some('(') => Some(ExampleValue::Call(word.to_owned(), self.entries("(", ")")?)),
-            Some('{') => Some(ExampleValue::Call(word.to_owned(), self.entries("{", "}")?)),
-            _ => Some(ExampleValue::Name(word.to_owned())),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::lang::words::{CONDITIONS, SIGNALS};
 
     #[test]
     fn what_is_written_in_lua_is_told_in_yaml() {

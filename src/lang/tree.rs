@@ -2,6 +2,7 @@
 
 use super::grammar::{Key, Languages, Object};
 use super::spelling::{as_yaml, told_in_yaml};
+use super::spelling_xml::told_in_scxml;
 use crate::diagnostics::{FileId, Language, SourceMap};
 use crate::limits;
 use crate::model::finding::did_you_mean;
@@ -95,7 +96,11 @@ pub struct Cx {
 impl Default for Cx {
     fn default() -> Self {
         let mut sources = SourceMap::new();
-        sources.spell_with(told_in_yaml);
+        sources.spell_with(|language, text| match language {
+            Language::Lua => text.to_owned(),
+            Language::Yaml => told_in_yaml(text),
+            Language::Scxml => told_in_scxml(text),
+        });
         Self { sources, findings: Findings::new(), unreadable: false }
     }
 }

@@ -299,7 +299,8 @@ impl Stack {
             let mut piles: SmallVec<[Pile; 4]> = self.frames.iter().map(|frame| frame.pile()).collect();
             while let Some(pile) = piles.pop() {
                 piles.retain(|other| *other != pile);
-                squash::fit(&mut self.frames, pile, self.bound, busy, self.memory.as_ref());
+                let room = squash::Quota { pile, bound: self.bound, busy };
+                squash::fit(&mut self.frames, room, self.memory.as_ref());
             }
         }
     }
@@ -348,7 +349,8 @@ impl Stack {
                 self.frames.push(frame);
                 busy.extend(waits.then_some(id));
                 // Room was made sure of when it began; where others hold on to frames since, there is one more for a while.
-                squash::fit(&mut self.frames, pile, self.bound, &busy, self.memory.as_ref());
+                let room = squash::Quota { pile, bound: self.bound, busy: &busy };
+                squash::fit(&mut self.frames, room, self.memory.as_ref());
             }
         }
         pushed

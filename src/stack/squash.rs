@@ -1,11 +1,12 @@
 //! Keeping each pile of frames within its bound: its oldest become one, which is undone as one (semantics: *The stack*).
 
 use super::net::reduce;
-use super::{Frame, FrameId, Inverse, Pile, share};
+use super::share::{self, HandOver};
+use super::{Frame, FrameId, Inverse, Pile};
 use crate::limits;
 use crate::model::{MemberRef, Step};
 use crate::plan::footprint::{Footprint, Slot, Touch};
-use crate::plan::undo::{DraftStep, items};
+use crate::plan::undo::{DraftStep, absolute, items};
 use crate::system::System;
 use rustc_hash::{FxHashMap, FxHashSet};
 use std::collections::BTreeSet;
@@ -41,52 +42,93 @@ impl Memory {
     }
 }
 
+/// Whose frames are squashed, and how far that may go.
+#[derive(Clone, Copy)]
+pub(super) struct Quota<'a> {
+    pub pile: Pile,
+    pub bound: usize,
+    /// These stay as they are.
+    pub busy: &'a [FrameId],
+}
+
+impl Quota<'_> {
+    fn own<'f>(&self, frames: &'f [Arc<Frame>]) -> impl Iterator<Item = usize> + 'f {
+        let pile = self.pile;
+        (0..frames.len()).filter(move |at| pile.has(&frames[*at]))
+    }
+}
+
 /// Whether a pile can be brought to at most `bound` frames.
-pub(super) fn fits(frames: &[Arc<Frame>], pile: Pile, bound: usize, busy: &[FrameId], memory: Option<&Memory>) -> bool {
-    let own = frames.iter().filter(|frame| pile.has(frame)).count();
+pub(super) fn fits(frames: &[Arc<Frame>], quota: Quota<'_>, memory: Option<&Memory>) -> bool {
     // What the last two of them become is nobody's to know yet.
-    match own.checked_sub(bound + 1) {
+    match quota.own(frames).count().checked_sub(quota.bound + 1) {
         None => true,
-        Some(0) => pair(frames, pile, busy).is_some(),
+        Some(0) => pair(frames, quota).is_some(),
         Some(_) => {
             let mut frames = frames.to_vec();
-            fit(&mut frames, pile, bound + 1, busy, memory) && pair(&frames, pile, busy).is_some()
+            fit(&mut frames, Quota { bound: quota.bound + 1, ..quota }, memory) && pair(&frames, quota).is_some()
         }
     }
 }
 
-/// Squashes until a pile has at most `bound` frames; `busy` ones stay as they are. False: no two could be squashed.
-pub(super) fn fit(
-    frames: &mut Vec<Arc<Frame>>,
-    pile: Pile,
-    bound: usize,
-    busy: &[FrameId],
-    memory: Option<&Memory>,
-) -> bool {
-    while frames.iter().filter(|frame| pile.has(frame)).count() > bound {
-        let Some((lower, upper)) = pair(frames, pile, busy) else { return false };
-        let upper = frames.remove(upper);
-        frames[lower] = match memory {
-            Some(memory) => memory.squash(&frames[lower], &upper),
-            None => Arc::new(squash(&frames[lower], &upper)),
+/// Squashes until a pile has at most `bound` frames. False: no two could be squashed.
+pub(super) fn fit(frames: &mut Vec<Arc<Frame>>, quota: Quota<'_>, memory: Option<&Memory>) -> bool {
+    while quota.own(frames).count() > quota.bound {
+        let Some(Pair { lower, upper, way }) = pair(frames, quota) else { return false };
+        let left = match way {
+            Way::Up(ref hand) if !hand.is_empty() => {
+                share::hand_over(frames, hand, &|id| id);
+                Some(overwritten(&frames[lower], &hand.slots))
+            }
+            Way::Up(_) | Way::Down => None,
         };
+        let made = match (&left, memory) {
+            (Some(left), _) => Arc::new(squash(left, &frames[upper])),
+            (None, Some(memory)) => memory.squash(&frames[lower], &frames[upper]),
+            (None, None) => Arc::new(squash(&frames[lower], &frames[upper])),
+        };
+        let (stays, goes) = if matches!(way, Way::Down) { (lower, upper) } else { (upper, lower) };
+        frames[stays] = made;
+        frames.remove(goes);
     }
     true
 }
 
-/// The places of the two that are squashed next: the oldest, but such that as much as possible stays possible. The upper
-/// one moves down to the lower, so nothing between may share with it.
-fn pair(frames: &[Arc<Frame>], pile: Pile, busy: &[FrameId]) -> Option<(usize, usize)> {
+/// Two frames that become one, by their places.
+struct Pair {
+    lower: usize,
+    upper: usize,
+    way: Way,
+}
+
+/// Where they become one.
+enum Way {
+    /// At the lower one's place: the upper one shares with nothing between.
+    Down,
+    /// At the upper one's place: what lies between takes over what the lower one wrote, and the upper one wrote that again.
+    Up(HandOver),
+}
+
+/// The two that are squashed next: the oldest, but such that as much as possible stays possible.
+fn pair(frames: &[Arc<Frame>], quota: Quota<'_>) -> Option<Pair> {
+    // A frame of a safe configuration is undone by its name before anything moves again; of those the newest is in force.
+    let safe = frames.iter().rev().find(|frame| frame.safe && quota.pile.has(frame)).map(|frame| frame.id);
+    among(frames, quota, &|frame| !frame.safe)
+        .or_else(|| safe.and_then(|safe| among(frames, quota, &|frame| frame.id != safe)))
+        .or_else(|| safe.and_then(|_| among(frames, quota, &|_| true)))
+}
+
+fn among(frames: &[Arc<Frame>], quota: Quota<'_>, may: &dyn Fn(&Frame) -> bool) -> Option<Pair> {
     // A partial frame is undone by its name.
-    let free = |f: &Frame| f.scope.is_none() && !f.partial && !busy.contains(&f.id);
-    let own: Vec<usize> = (0..frames.len()).filter(|at| pile.has(&frames[*at])).collect();
+    let free = |f: &Frame| f.scope.is_none() && !f.partial && !quota.busy.contains(&f.id) && may(f);
+    let own: Vec<usize> = quota.own(frames).collect();
     let newest = own.last().copied();
-    let clear = |lower: usize, upper: usize| {
-        frames[lower + 1..upper].iter().all(|between| !share::shares(&frames[upper], between))
-    };
     let pairs = own.windows(2).map(|two| (two[0], two[1])).filter(|(a, b)| free(&frames[*a]) && free(&frames[*b]));
     // What lies between is looked at last: that takes longest.
-    let first = |fits: &dyn Fn(usize, usize) -> bool| pairs.clone().find(|(a, b)| fits(*a, *b) && clear(*a, *b));
+    let first = |fits: &dyn Fn(usize, usize) -> bool| {
+        let mut fitting = pairs.clone().filter(|(a, b)| fits(*a, *b));
+        fitting.find_map(|(lower, upper)| Some(Pair { lower, upper, way: way(frames, lower, upper, quota.busy)? }))
+    };
     // The newest frame stays by itself as long as there is any other way: it is the one most likely to be undone.
     let older = |upper: usize| Some(upper) != newest;
     let (floor, group) = (|at: usize| frames[at].floor.is_some(), |at: usize| frames[at].group.is_some());
@@ -97,6 +139,41 @@ fn pair(frames: &[Arc<Frame>], pile: Pile, busy: &[FrameId]) -> Option<(usize, u
         .or_else(|| first(&|a, b| older(b) && !floor(a)))
         .or_else(|| first(&|_, b| older(b)))
         .or_else(|| first(&|_, _| true))
+}
+
+/// A frame of somebody else that keeps two of the pile apart.
+pub(super) fn between<'f>(frames: &'f [Arc<Frame>], quota: Quota<'_>) -> Option<&'f Frame> {
+    let own: Vec<usize> = quota.own(frames).collect();
+    let apart = own.windows(2).flat_map(|two| {
+        let upper = &frames[two[1]];
+        frames[two[0] + 1..two[1]].iter().filter(move |between| share::shares(upper, between))
+    });
+    apart.map(|frame| &**frame).next()
+}
+
+/// How two become one past what lies between: whatever is undone later leads to where it would have led.
+fn way(frames: &[Arc<Frame>], lower: usize, upper: usize, busy: &[FrameId]) -> Option<Way> {
+    if frames[lower + 1..upper].iter().all(|between| !share::shares(&frames[upper], between)) {
+        return Some(Way::Down);
+    }
+    let hand = share::examine(&frames[..upper], lower).ok()?;
+    let (old, new) = (&frames[lower], &frames[upper]);
+    // What a run state serves is not taken apart.
+    let again = |slot: Slot| {
+        new.saved.iter().any(|saved| saved.slot == slot)
+            && !old.footprint.touches.iter().any(|touch| touch.serves == Some(slot))
+    };
+    let taken = hand.taken().all(again) && hand.slots.len() == hand.taken().count();
+    (taken && !hand.takers().any(|id| busy.contains(&id))).then_some(Way::Up(hand))
+}
+
+/// What is left of a frame whose absolute writes of these slots others have taken over.
+fn overwritten(frame: &Frame, slots: &FxHashSet<Slot>) -> Frame {
+    let mut inverse = list(frame);
+    inverse.retain(|item| absolute(&item.step).is_none_or(|slot| !slots.contains(&slot)));
+    let saved = frame.saved.iter().filter(|saved| !slots.contains(&saved.slot)).cloned().collect();
+    let touches = frame.footprint.touches.iter().filter(|touch| !slots.contains(&touch.slot)).copied().collect();
+    Frame { inverse: Inverse::List(inverse), saved, footprint: Arc::new(Footprint { touches }), ..frame.clone() }
 }
 
 /// The list that takes a frame back.

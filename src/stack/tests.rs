@@ -238,6 +238,72 @@ fn frames_of_active_states_are_never_squashed() {
 }
 
 #[test]
+fn the_safe_frame_in_force_is_squashed_last() {
+    let mut bench = Bench::new(3);
+    let safe = Configuration { safe: true, ..conf("safe", None, &[], vec![call("B.open")], &[]) };
+    let of = |n: usize| conf(&format!("c{n}"), None, &[], vec![set("A.gain", n as f64)], &[]);
+    let kept = bench.ok(&[push(&safe)]).1[0];
+    for n in 0..9 {
+        bench.ok(&[push(&of(n))]);
+    }
+    assert!(bench.stack.len() == 3 && bench.stack.frame(kept).is_some_and(|frame| !frame.is_squashed()));
+    // One that is never undone is in nobody's way.
+    let mut newest = kept;
+    for n in 0..9 {
+        bench.ok(&[push(&of(n))]);
+        newest = bench.ok(&[push(&safe)]).1[0];
+        assert!(bench.stack.len() <= 3);
+    }
+    bench.ok(&[push(&of(9))]);
+    assert!(bench.stack.frame(newest).is_some_and(|frame| !frame.is_squashed()));
+    bench.ok(&[Op::Undo(newest)]);
+}
+
+fn at(configuration: &Configuration, requester: Requester) -> Op<'_> {
+    Op::Push { configuration, requester, at: Time(0), scope: None }
+}
+
+#[test]
+fn what_others_set_between_does_not_keep_frames_apart() {
+    let mut bench = Bench::new(3);
+    let by = |name: &str| Requester::Coordinator(ComponentName::new(name).unwrap());
+    let of = |id: &str, gain: usize, other: f64| {
+        conf(id, None, &[], vec![set("A.gain", gain as f64), set("B.gain", other)], &[])
+    };
+    for n in 0..8 {
+        bench.ok(&[at(&of("mode", n, 0.5), by("c"))]);
+        bench.ok(&[at(&conf("mine", None, &[], vec![set("A.gain", 10.0 + n as f64)], &[]), Requester::Operator)]);
+    }
+    assert_eq!(bench.stack.len(), 6);
+    // What the operator has set lately is there without what the coordinator did, and the other way about.
+    let all: Vec<FrameId> = bench.stack.frames().iter().map(|frame| frame.id).collect();
+    let whose = |bench: &Bench, id| bench.stack.frame(id).is_some_and(|frame| frame.requester == Requester::Operator);
+    for id in all.iter().rev().filter(|id| !whose(&bench, **id)).copied().collect::<Vec<_>>() {
+        bench.ok(&[Op::Undo(id)]);
+    }
+    assert_eq!((bench.value("A.gain"), bench.value("B.gain")), (17.0, 0.0));
+    bench.ok(&[Op::UndoTo(0)]);
+    assert_eq!(bench.value("A.gain"), 0.0);
+    // Written by the older one and between, not again by the newer one, which shares something else with what is between.
+    let mut bench = Bench::new(2);
+    let [low, high] =
+        [("low", "A.gain"), ("high", "B.gain")].map(|(id, of)| conf(id, None, &[], vec![set(of, 1.0)], &[]));
+    for own in [&low, &high] {
+        bench.ok(&[at(own, by("c"))]);
+        bench.ok(&[at(&of("mine", 2, 2.0), Requester::Operator)]);
+    }
+    let refused = bench.ask(&[at(&low, by("c"))]).unwrap_err();
+    let finding = &refused.findings[0];
+    assert_eq!(
+        (finding.code.0, finding.help.as_deref().unwrap_or_default()),
+        (
+            "stack::full",
+            "undo or commit `mine` (a frame of operator), which lies between two of them, or raise `limits: { stack: … }` in the deployment"
+        )
+    );
+}
+
+#[test]
 fn calls_that_pile_up_become_a_floor() {
     let mut bench = Bench::new(2);
     for n in 0..crate::limits::SQUASHED_CALLS + 4 {

@@ -436,10 +436,20 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
             let taken = room.places.iter().filter(|of| **of == pile).count();
             let own = taken + frames.iter().filter(|frame| pile.has(frame)).count();
             let bound = stack.bound.saturating_sub(taken);
-            if own > stack.bound && !squash::fits(&frames, pile, bound, &busy, stack.memory.as_ref()) {
+            let wanted = squash::Quota { pile, bound, busy: &busy };
+            if own > stack.bound && !squash::fits(&frames, wanted, stack.memory.as_ref()) {
                 let message = format!("{pile} would have {}, and none can be squashed", count(own, "frame"));
-                let finding = Finding::error(codes::STACK_FULL, message)
-                    .help("undo or commit something, or raise `limits: { stack: … }` in the deployment");
+                let what = squash::between(&frames, wanted).map_or_else(
+                    || "something".to_owned(),
+                    |frame| {
+                        format!(
+                            "`{}` (a frame of {}), which lies between two of them",
+                            frame.configuration, frame.requester
+                        )
+                    },
+                );
+                let help = format!("undo or commit {what}, or raise `limits: {{ stack: … }}` in the deployment");
+                let finding = Finding::error(codes::STACK_FULL, message).help(help);
                 return Err(Refusal { findings: vec![finding], request: parts.len().saturating_sub(1) });
             }
         }

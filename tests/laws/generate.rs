@@ -26,7 +26,7 @@ pub struct TypeGene {
 pub struct ConfigGene {
     pub id: u8,
     pre: Vec<(u8, u8)>,
-    changes: Vec<[u8; 4]>,
+    pub changes: Vec<[u8; 4]>,
     post: Vec<(u8, u8)>,
     pub group: u8,
 }

@@ -15,7 +15,7 @@ use proptest::prelude::*;
 use std::sync::Arc;
 
 /// What nobody else needs is what these laws are about.
-fn catalogue(genes: &[TypeGene]) -> Arc<Catalogue> {
+pub fn catalogue(genes: &[TypeGene]) -> Arc<Catalogue> {
     let mut catalogue = Catalogue::new();
     for ty in generate::catalogue(genes, false).iter() {
         let mut ty = (**ty).clone();

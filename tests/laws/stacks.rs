@@ -1,13 +1,16 @@
 //! Laws of stacks: n pushes and n pops, pop_to, selective undo, net, squash.
 
 use crate::generate::{self, ConfigGene, TypeGene, context, read};
+use crate::names::name;
 use crate::plain::Plain;
 use crate::plans::{every_order, operator, show};
 use crate::settings;
 use davit::model::{Catalogue, ChangeKind, Configuration, Snapshot, Step};
 use davit::plan::{PlanStage, PlannedStep, Refusal};
-use davit::stack::{FrameId, Op, Planned, Scope, Stack, transaction};
+use davit::stack::{FrameId, Op, Planned, Requester, Scope, Stack, transaction};
 use davit::system::{System, View, step};
+use davit::time::Time;
+use proptest::collection::vec;
 use proptest::prelude::*;
 use std::sync::Arc;
 
@@ -237,6 +240,49 @@ proptest! {
             prop_assert_eq!(small.system.snapshot(), large.system.snapshot());
         }
         prop_assert!(small.system.is_empty());
+    }
+
+    /// With frames of another requester between them, too: whatever is undone of a small stack, the same parts of a large one lead to the
+    /// same system.
+    #[test]
+    fn squash_between((types, genes) in world(4..14), whose in vec(any::<bool>(), 14), bound in 2usize..4, undone in vec(any::<prop::sample::Index>(), 8)) {
+        let catalogue = crate::piles::catalogue(&types);
+        let (mut small, mut large) = (Both::new(catalogue.clone(), bound), Both::new(catalogue, 64));
+        let mut pushed: Vec<(FrameId, Requester)> = Vec::new();
+        for (n, (gene, asked)) in genes.iter().zip(whose).enumerate() {
+            let mut gene = gene.clone();
+            gene.id %= 56;
+            // Of what there is by then the values are set, mostly: that is what several may write.
+            let sets = gene.changes.iter_mut().filter(|change| n > 2 && change[0] % 4 > 0);
+            sets.for_each(|change| (change[0], change[1], change[3]) = (10, change[1] % 3, 1));
+            let conf = Configuration { group: None, ..read(&gene, &large.system) };
+            let requester = if asked { Requester::Coordinator(name("c")) } else { Requester::Operator };
+            let push = [Op::Push { configuration: &conf, requester, at: Time(1), scope: None }];
+            // Refused as such, or nothing could be squashed.
+            let Ok(id) = small.make(&push) else { continue };
+            prop_assert_eq!(&large.make(&push).unwrap(), &id);
+            pushed.push((id[0], requester));
+            prop_assert!(small.stack.len() <= 2 * bound);
+        }
+        for pick in undone {
+            let frames = small.stack.frames();
+            if frames.is_empty() {
+                break;
+            }
+            let frame = &frames[pick.index(frames.len())];
+            let (id, requester) = (frame.id, frame.requester);
+            // Neighbours of one requester become one, which has the newest one's number.
+            let older = frames.iter().filter(|frame| frame.requester == requester && frame.id < id).map(|frame| frame.id).max();
+            let is_part = |(part, by): &(FrameId, Requester)| *by == requester && *part <= id && older.is_none_or(|older| *part > older);
+            if let Err(refusal) = small.make(&[Op::Undo(id)]) {
+                prop_assert!(small.stack.top().unwrap().id != id, "the newest one can be undone: {:?}", refusal);
+                continue;
+            }
+            let parts: Vec<Op<'_>> = pushed.iter().rev().filter(|part| is_part(part)).map(|(part, _)| Op::Undo(*part)).collect();
+            pushed.retain(|part| !is_part(part));
+            large.make(&parts).map_err(|refusal| TestCaseError::fail(format!("{refusal:?}")))?;
+            prop_assert_eq!(small.system.snapshot(), large.system.snapshot());
+        }
     }
 }
 

@@ -27,6 +27,7 @@ const SCENARIOS: [(&str, &[(&str, &str)]); 19] = [
     ("shutdown_while_copying", &[]),
     ("through_the_world", &[]),
     ("tracking", &[("seconds", "20")]),
+    ("tuned", &[]),
     ("udp", &[]),
 ];
 
@@ -155,6 +156,11 @@ fn through_the_world() {
 #[test]
 fn tracking() {
     run("tracking");
+}
+
+#[test]
+fn tuned() {
+    run("tuned");
 }
 
 #[test]
