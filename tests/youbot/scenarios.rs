@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Each with what is set for it here: what takes a minute in the file is shorter.
-const SCENARIOS: [(&str, &[(&str, &str)]); 19] = [
+const SCENARIOS: [(&str, &[(&str, &str)]); 20] = [
     ("bring_up", &[]),
     ("crash", &[]),
     ("driver", &[]),
