@@ -10,7 +10,7 @@ local Ba    = param("damping", 2)       -- N s/m
 local friction = param("friction", 0.1) -- of the joints, as a share of the nominal one
 
 assert(law == "position" or law == "tank", "`law` is position or tank")
-deploy(law == "tank" and "observed/tank.yaml" or "observed/coupling.yaml")
+deploy(law == "tank" and "tank/coupling.yaml" or "../deployments/youbot_coupling.yaml")
 
 local ROBOTS = { "left", "right" }
 local function hand(robot, script) set(robot .. "/Operator.script", script, { force = true, within = 1 }) end
@@ -18,13 +18,14 @@ local function of_both(property, value)
   for _, robot in ipairs(ROBOTS) do set(robot .. "/" .. property, value, { force = true, within = 1 }) end
 end
 
+hand("left", "free 1.5; align 8; hold 1; free 600")
 set("Observer.stiffness", K, { force = true, within = 1 })
 for _, robot in ipairs(ROBOTS) do wait_state(robot .. ":copying", 20) end
 for _, robot in ipairs(ROBOTS) do raise(robot .. "/e_5dof") end
 of_both("Cart_Impedance.damping_rel", 0)
 of_both("Cart_Impedance.damping_abs", Ba)
 of_both("Cart_Impedance.stiffness", K)
-of_both("World.robot1_friction_scale", friction)
+for number = 1, 2 do set("World.robot" .. number .. "_friction_scale", friction, { force = true, within = 1 }) end
 of_both("Dynamics.friction_comp", 0.9 * friction)
 hand("right", "free 600")
 -- Slow from here on: over a slow network they would not begin to couple.
@@ -32,9 +33,9 @@ for _, net in ipairs{ "To_Right", "To_Left" } do set(net .. ".delay", delay, { f
 wait(0.5)
 
 local signals = { energy = "Observer.energy", force = "left/Cart_Impedance.f_raw_norm" }
-for _, robot in ipairs(ROBOTS) do
+for number, robot in ipairs(ROBOTS) do
   signals[robot] = robot .. "/Cart_Impedance.active"
-  for i, axis in ipairs{ "x", "y", "z" } do signals[robot .. axis] = robot .. "/World.robot1_tool_pose.p[" .. i - 1 .. "]" end
+  for i, axis in ipairs{ "x", "y", "z" } do signals[robot .. axis] = "World.robot" .. number .. "_tool_pose.p[" .. i - 1 .. "]" end
 end
 hand("left", "free 0.1; push 0.5 0 3 0; free 600")
 local s = sample{ every = 0.002, signals = signals }

@@ -3,9 +3,10 @@
 -- The order between configurations is the coordinator's; inside a configuration there is none.
 -- The four configurations of the coupling's switch are in coupling.lua.
 
--- `stand_in`: a stand-in for the other robot is part of the deployment (deployments/youbot_arm.yaml). In the coupling of two robots there
--- is none (deployments/youbot_robot.yaml): what the link sends and hears is exported. `hand`: what the operator's hand does, `ifname`: the
--- network interface of the drives' bus, which a driver has for itself, `law`: of the coupling, the same at both ends.
+-- `stand_in`: the world that the robot is in and a stand-in for the other robot are part of the deployment (deployments/youbot_arm.yaml). In
+-- the coupling of two robots they are not (deployments/youbot_robot.yaml): what driver and hand exchange with the world, and what the link
+-- sends and hears, is exported. `hand`: what the operator's hand does, `ifname`: the network interface of the drives' bus, which a driver has
+-- for itself, `law`: of the coupling, the same at both ends.
 
 local function with_stand_in(changes, more)
   if stand_in then
@@ -23,14 +24,15 @@ ConfiguratorConf {
 
   -- Bring-up ---------------------------------------------------------------------------------------------------------
 
-  create_core = Configuration { description = "the control loop",
-    create("World",          "youbot.World",          { activity = "world" }),      -- arm, base and what they touch
+  create_core = Configuration(with_stand_in({ description = "the control loop",
     create("youbot",         "youbot.Driver",         { activity = "control", properties = { ifname = stand_in and "sim0" or ifname } }),
     create("Arm_Kinematics", "youbot.Arm_Kinematics", { activity = "control" }),
     create("Cart_Impedance", "youbot.Cart_Impedance", { activity = "control" }),
     create("Dynamics",       "youbot.Dynamics",       { activity = "control" }),
     create("Base_Ctrl",      "youbot.Base_Ctrl",      { activity = "base" }),
-  },
+  }, function() return {
+    create("World",          "youbot.World",          { activity = "world" }),      -- arm, base and what they touch
+  } end)),
 
   create_link = Configuration(with_stand_in({ description = "the link to the other robot, and perhaps a stand-in for that robot",
     create("Link_Tx", "youbot.Link_Tx", { activity = "link" }),
@@ -47,9 +49,6 @@ ConfiguratorConf {
   },
 
   connect_all = Configuration(with_stand_in({
-    -- the driver and what it drives
-    connect("World.robot1_state",            "youbot.plant_state"),
-    connect("youbot.plant_command",          "World.robot1_command"),
     -- control loop
     connect("youbot.jointstate",             "Arm_Kinematics.jointstate"),
     connect("youbot.odometry",               "Arm_Kinematics.odometry"),
@@ -75,11 +74,8 @@ ConfiguratorConf {
     connect("Link_Rx.echo",                   "Link_Tx.echo"),
     connect("Link_Rx.peer_state",             "Dynamics.peer_state"),
     -- the operator's hand
-    connect("World.robot1_tool_pose",        "Operator.tool_pose"),
-    connect("World.robot1_tool_twist",       "Operator.tool_twist"),
     connect("Link_Rx.ext_ref",               "Operator.ext_ref"),
     connect("youbot.control_mode",           "Operator.control_mode"),
-    connect("Operator.ext_force",            "World.robot1_ext_force"),
     -- who watches is watched
     connect("Monitors.is_near",              "youbot.watched"),
     -- record
@@ -91,24 +87,31 @@ ConfiguratorConf {
     connect("Cart_Impedance.f_raw_norm",     "Reporter.f_raw_norm"),
     connect("Cart_Impedance.active",         "Reporter.active"),
   }, function() return {
+    -- driver and hand, and what they have hold of
+    connect("World.robot1_state",            "youbot.plant_state"),
+    connect("youbot.plant_command",          "World.robot1_command"),
+    connect("World.robot1_tool_pose",        "Operator.tool_pose"),
+    connect("World.robot1_tool_twist",       "Operator.tool_twist"),
+    connect("Operator.ext_force",            "World.robot1_ext_force"),
+    -- the stand-in
     connect("Link_Tx.tx",                    "Peer.rx",    { buffer = 64 }),
     connect("Peer.tx",                       "Link_Rx.rx", { buffer = 64 }),
   } end)),
 
   load_properties = Configuration(with_law(with_stand_in({ description = "this robot's own numbers, then everything configured",
-    property_set("World.robot1_q_start",         { 0.0, -1.1257, 2.5395, -1.7802, 0.0 }),
     property_set("Cart_Impedance.stiffness",     150.0),
     property_set("Cart_Impedance.damping_abs",   5.0),
     property_set("Cart_Impedance.offset",        { 0.0, 0.0, 0.0 }),
     property_set("Operator.script",              stand_in and "free 0.5; align 8; hold 1; sway 600 0.06 0 0 0.15" or hand),
     post_conf_state = { "_default:configured" },
   }, function() return {
+    property_set("World.robot1_q_start",         { 0.0, -1.1257, 2.5395, -1.7802, 0.0 }),
     property_set("Peer.delay",                   0.005),
     property_set("Peer.force_gain",              { 0.1, 0.1, 0.1 }),   -- its base yields as ours does
   } end))),
 
   start_driver = Configuration { description = "drives on, brakes closed: the arm rests on its stops",
-    post_conf_state = { "World:running", "youbot:running" },
+    post_conf_state = stand_in and { "World:running", "youbot:running" } or { "youbot:running" },
   },
 
   calibrate = Configuration { timeout = 10.0,
@@ -208,7 +211,7 @@ ConfiguratorConf {
   },
 
   stop_control = Configuration { description = "everything but the driver",
-    pre_conf_state = { "youbot:running", "World:running", "_default:stopped" },
+    pre_conf_state = stand_in and { "youbot:running", "World:running", "_default:stopped" } or { "youbot:running", "_default:stopped" },
   },
 
   stop_all = Configuration {
@@ -221,8 +224,6 @@ ConfiguratorConf {
   },
 
   disconnect_all = Configuration(with_stand_in({
-    disconnect("World.robot1_state",            "youbot.plant_state"),
-    disconnect("youbot.plant_command",          "World.robot1_command"),
     disconnect("youbot.jointstate",             "Arm_Kinematics.jointstate"),
     disconnect("youbot.odometry",               "Arm_Kinematics.odometry"),
     disconnect("Arm_Kinematics.tool_pose",      "Cart_Impedance.tool_pose"),
@@ -245,11 +246,8 @@ ConfiguratorConf {
     disconnect("Dynamics.yields",                "Link_Tx.yields"),
     disconnect("Link_Rx.echo",                   "Link_Tx.echo"),
     disconnect("Link_Rx.peer_state",             "Dynamics.peer_state"),
-    disconnect("World.robot1_tool_pose",        "Operator.tool_pose"),
-    disconnect("World.robot1_tool_twist",       "Operator.tool_twist"),
     disconnect("Link_Rx.ext_ref",               "Operator.ext_ref"),
     disconnect("youbot.control_mode",           "Operator.control_mode"),
-    disconnect("Operator.ext_force",            "World.robot1_ext_force"),
     disconnect("Monitors.is_near",              "youbot.watched"),
     disconnect("Arm_Kinematics.tool_pose",      "Reporter.tool_pose"),
     disconnect("Link_Rx.ext_ref",               "Reporter.ext_ref"),
@@ -259,15 +257,20 @@ ConfiguratorConf {
     disconnect("Cart_Impedance.f_raw_norm",     "Reporter.f_raw_norm"),
     disconnect("Cart_Impedance.active",         "Reporter.active"),
   }, function() return {
+    disconnect("World.robot1_state",            "youbot.plant_state"),
+    disconnect("youbot.plant_command",          "World.robot1_command"),
+    disconnect("World.robot1_tool_pose",        "Operator.tool_pose"),
+    disconnect("World.robot1_tool_twist",       "Operator.tool_twist"),
+    disconnect("Operator.ext_force",            "World.robot1_ext_force"),
     disconnect("Link_Tx.tx",                    "Peer.rx"),
     disconnect("Peer.tx",                       "Link_Rx.rx"),
   } end)),
 
   destroy_all = Configuration(with_stand_in({
-    destroy("World"), destroy("youbot"), destroy("Arm_Kinematics"), destroy("Cart_Impedance"), destroy("Dynamics"), destroy("Base_Ctrl"),
+    destroy("youbot"), destroy("Arm_Kinematics"), destroy("Cart_Impedance"), destroy("Dynamics"), destroy("Base_Ctrl"),
     destroy("Link_Tx"), destroy("Link_Rx"),
     destroy("Monitors"), destroy("Operator"), destroy("Mode_Switch"), destroy("Reporter"),
   }, function() return {
-    destroy("Peer"),
+    destroy("World"), destroy("Peer"),
   } end)),
 }

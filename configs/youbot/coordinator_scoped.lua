@@ -101,7 +101,7 @@ return state {
     creating_core     = state { entry = "create_core" },
     creating_link     = state { entry = "create_link" },
     creating_monitors = state { entry = "create_monitors" },
-    wiring            = state { entry = "connect_all" },
+    wiring            = state { entry = { "e_built", "connect_all" } },    -- from here on its parts are there for others to connect
     configuring       = state { entry = "load_properties" },
     powering          = state { entry = "start_driver" },
     calibrating       = state { entry = "calibrate" },
@@ -134,6 +134,7 @@ return state {
     powering_down  = state { entry = "start_driver.undo" },
     unconfiguring  = state { entry = "load_properties.undo" },
     unwiring       = state { entry = "connect_all.undo" },
+    letting_go     = state { entry = "e_leaving" },
     removing_monitors = state { entry = "create_monitors.undo" },
     removing_link     = state { entry = "create_link.undo" },
     removing_core     = state { entry = "create_core.undo" },
@@ -145,7 +146,8 @@ return state {
     trans { src = "uncalibrating",     tgt = "powering_down",     events = { "calibrate.undone" } },
     trans { src = "powering_down",     tgt = "unconfiguring",     events = { "start_driver.undone" } },
     trans { src = "unconfiguring",     tgt = "unwiring",          events = { "load_properties.undone" } },
-    trans { src = "unwiring",          tgt = "removing_monitors", events = { "connect_all.undone" } },
+    trans { src = "unwiring",          tgt = "letting_go",        events = { "connect_all.undone" } },
+    trans { src = "letting_go",        tgt = "removing_monitors", events = { "e_released" } },
     trans { src = "removing_monitors", tgt = "removing_link",     events = { "create_monitors.undone" } },
     trans { src = "removing_link",     tgt = "removing_core",     events = { "create_link.undone" } },
   },
@@ -288,6 +290,7 @@ return state {
     powering_off = state { entry = "stop_all" },
     cleaning     = state { entry = "cleanup_all" },
     unwiring     = once("disconnect_all"),
+    letting_go   = state { entry = "e_leaving" },      -- whoever holds something of it is waited for, and asked again after a stop
     destroying   = once("destroy_all"),
 
     trans { src = "initial",      tgt = "quieting" },
@@ -297,7 +300,8 @@ return state {
     trans { src = "stopping",     tgt = "powering_off", events = { "stop_control.ok" } },
     trans { src = "powering_off", tgt = "cleaning",     events = { "stop_all.ok" } },
     trans { src = "cleaning",     tgt = "unwiring",     events = { "cleanup_all.ok" } },
-    trans { src = ".unwiring.going", tgt = "destroying", events = { "disconnect_all.ok" } },
+    trans { src = ".unwiring.going", tgt = "letting_go", events = { "disconnect_all.ok" } },
+    trans { src = "letting_go",   tgt = "destroying",   events = { "e_released" } },
   },
 
   -- A step of the teardown failed: everything stays as it is, the arm where it is. `e_shutdown` goes on from there.
@@ -363,6 +367,7 @@ return state {
   trans { src = "shutting_down.stopping",     tgt = "resting.parked",  events = STOPS },
   trans { src = "shutting_down.powering_off", tgt = "resting.parked",  events = STOPS },
   trans { src = "shutting_down.cleaning",     tgt = "resting.stopped", events = STOPS },
+  trans { src = "shutting_down.letting_go",   tgt = "resting.unwired", events = STOPS },
   trans { src = "shutting_down.unwiring.braked",   tgt = "resting.unwired.waiting", events = { "disconnect_all.ok" } },
   trans { src = "shutting_down.unwiring.braked",   tgt = "resting.cleaned.waiting",
           events = { "disconnect_all.failed", "disconnect_all.cancelled", "disconnect_all.broken" } },
@@ -379,7 +384,7 @@ return state {
   trans { src = "resting.parked.releasing.leaving",  tgt = "shutting_down.stopping",    events = { "safe_hold.undone" } },
   trans { src = "resting.stopped.releasing.leaving", tgt = "shutting_down.cleaning",    events = { "safe_hold.undone" } },
   trans { src = "resting.cleaned.releasing.leaving", tgt = "shutting_down.unwiring",    events = { "safe_hold.undone" } },
-  trans { src = "resting.unwired.releasing.leaving", tgt = "shutting_down.destroying",  events = { "safe_hold.undone" } },
+  trans { src = "resting.unwired.releasing.leaving", tgt = "shutting_down.letting_go",  events = { "safe_hold.undone" } },
 
   trans { src = "deploying",                tgt = "halted", events = STOPS },
   trans { src = "deploy_failed",            tgt = "halted", events = STOPS },
@@ -404,6 +409,6 @@ return state {
   trans { src = "stranded.parked",         tgt = "shutting_down.stopping",     events = { "e_shutdown", "e_go_on" } },
   trans { src = "stranded.stopped",        tgt = "shutting_down.cleaning",     events = { "e_shutdown", "e_go_on" } },
   trans { src = "stranded.cleaned",        tgt = "shutting_down.unwiring",     events = { "e_shutdown", "e_go_on" } },
-  trans { src = "stranded.unwired",        tgt = "shutting_down.destroying",   events = { "e_shutdown", "e_go_on" } },
+  trans { src = "stranded.unwired",        tgt = "shutting_down.letting_go",   events = { "e_shutdown", "e_go_on" } },
   trans { src = "shutting_down.destroying", tgt = "idle", events = { "destroy_all.ok" } },
 }

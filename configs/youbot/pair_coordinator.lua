@@ -1,57 +1,70 @@
 -- Coordinator of two coupled robots. It knows of each of them what that one's file accepts and emits, and no state, no component and no
--- configuration of it: it begins both, joins their links while both are up, and leads both down.
+-- configuration of it: it makes the world and the networks, begins both robots, leads both down, and takes world and networks away.
+-- What keeps a robot in the world while it is built is a coordinator beside this one, for each robot (place.lua).
 --
--- `left/up`, `left/failed`, `left/down` are told of every subsystem without being written.
+-- `left/up` and `left/failed` are told without being written.
 
--- Of the two the order is not known in which they come to it.
-local function both(how, done)
-  return state {
+-- Of the two the order is not known in which they come to it. `again`: what is asked of one that has not come to it yet.
+local function both(left, right, again)
+  local function on(of, how) return { src = of, tgt = of, events = { how[1] }, effect = how[2] } end
+  local all = {
     neither = state {},
     left    = state {},
     right   = state {},
-    both    = state { entry = done },
+    both    = state {},
     trans { src = "initial", tgt = "neither" },
-    trans { src = "neither", tgt = "left",  events = { "left/"  .. how } },
-    trans { src = "neither", tgt = "right", events = { "right/" .. how } },
-    trans { src = "left",    tgt = "both",  events = { "right/" .. how } },
-    trans { src = "right",   tgt = "both",  events = { "left/"  .. how } },
+    trans { src = "neither", tgt = "left",  events = { left } },
+    trans { src = "neither", tgt = "right", events = { right } },
+    trans { src = "left",    tgt = "both",  events = { right } },
+    trans { src = "right",   tgt = "both",  events = { left } },
   }
+  for waiting, robots in pairs(again and { neither = { "left", "right" }, left = { "right" }, right = { "left" } } or {}) do
+    for _, each in ipairs(again(robots)) do table.insert(all, trans(on(waiting, each))) end
+  end
+  return state(all)
 end
 
 return state {
 
   idle = state {},
 
-  alive = state { entry = { "left/e_start", "right/e_start" },
-    raising = both("up", "join"),
+  alive = state {
+    making  = state { entry = "make" },
+    raising = both("left/up", "right/up"),
     joined  = state {},
     -- One of them did not come up: it is said so, and both are led down when that is asked for.
     failed  = state {},
-    trans { src = "initial",       tgt = "raising" },
-    trans { src = "raising",       tgt = "failed", events = { "left/failed", "right/failed", "join.failed", "join.broken" } },
-    trans { src = ".raising.both", tgt = "joined", events = { "join.ok" } },
+    trans { src = "initial",       tgt = "making" },
+    trans { src = "making",        tgt = "raising", events = { "make.ok" }, effect = { "e_made", "left/e_start", "right/e_start" } },
+    trans { src = "making",        tgt = "failed",  events = { "make.failed", "make.broken" } },
+    trans { src = "raising",       tgt = "failed",  events = { "left/failed", "right/failed" } },
+    trans { src = ".raising.both", tgt = "joined",  events = { "e_done" } },
   },
 
-  -- The links are taken apart before either robot leaves.
-  parting = state { entry = "join.undo" },
+  -- Each is out when it is in the world no more and will not be placed there again. One that is down when it is asked says so by having
+  -- nothing to do; one that was stopped on its way waits to be asked once more.
+  lowering = both("e_left_out", "e_right_out", function(robots)
+    local asked, each = {}, {}
+    for _, robot in ipairs(robots) do
+      local close = "e_" .. robot .. "_close"
+      table.insert(asked, close)
+      table.insert(asked, robot .. "/e_shutdown")
+      table.insert(each, { "e_" .. robot .. "_gone", close })
+    end
+    table.insert(each, { "e_shutdown", asked })
+    return each
+  end),
 
-  -- They could not be: nothing is taken away under them. `e_shutdown` tries again.
-  tied = state {},
+  unmaking = state { entry = "make.undo" },
+  -- It could not be taken away. `e_shutdown` tries again.
+  stuck    = state {},
 
-  -- One that was stopped on its way waits to be asked once more; whoever is down already has nothing to do.
-  lowering = state { entry = { "left/e_shutdown", "right/e_shutdown" },
-    going = both("down"),
-    trans { src = "initial",        tgt = "going" },
-    trans { src = ".going.neither", tgt = ".going.neither", events = { "e_shutdown" }, effect = { "left/e_shutdown", "right/e_shutdown" } },
-    trans { src = ".going.left",    tgt = ".going.left",    events = { "e_shutdown" }, effect = "right/e_shutdown" },
-    trans { src = ".going.right",   tgt = ".going.right",   events = { "e_shutdown" }, effect = "left/e_shutdown" },
-  },
-
-  trans { src = "initial", tgt = "idle" },
-  trans { src = "idle",    tgt = "alive",    events = { "e_start" } },
-  trans { src = "alive",   tgt = "parting",  events = { "e_shutdown" } },
-  trans { src = "parting", tgt = "lowering", events = { "join.undone" } },
-  trans { src = "parting", tgt = "tied",     events = { "join.undo.failed", "join.undo.broken" } },
-  trans { src = "tied",    tgt = "parting",  events = { "e_shutdown" } },
-  trans { src = "lowering.going.both", tgt = "idle", events = { "e_done" } },
+  trans { src = "initial",        tgt = "idle" },
+  trans { src = "idle",           tgt = "alive",    events = { "e_start" } },
+  trans { src = "alive",          tgt = "lowering", events = { "e_shutdown" },
+          effect = { "e_left_close", "e_right_close", "left/e_shutdown", "right/e_shutdown" } },
+  trans { src = ".lowering.both", tgt = "unmaking", events = { "e_done" } },
+  trans { src = "unmaking",       tgt = "idle",     events = { "make.undone" } },
+  trans { src = "unmaking",       tgt = "stuck",    events = { "make.undo.failed", "make.undo.broken" } },
+  trans { src = "stuck",          tgt = "unmaking", events = { "e_shutdown" } },
 }

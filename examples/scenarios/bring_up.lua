@@ -4,7 +4,7 @@
 
 deploy("../../deployments/youbot_coupling.yaml")
 raise("e_shutdown")
-wait_state("youbot_coupling:idle", 20)
+wait_state("pair:idle", 20)
 local begin = now()
 raise("e_start")
 wait_state("left:calibrating", 1)

@@ -20,7 +20,7 @@ for _, dead in ipairs(DEAD) do
   wait(2)
   wait_state("left:copying", 0)
   local s = sample{ every = 0.001, name = component, signals = {
-    x = "left/World.robot1_tool_twist.v[0]", y = "left/World.robot1_tool_twist.v[1]", z = "left/World.robot1_tool_twist.v[2]" } }
+    x = "World.robot1_tool_twist.v[0]", y = "World.robot1_tool_twist.v[1]", z = "World.robot1_tool_twist.v[2]" } }
   local at = now() + 0.01
   inject("left/" .. component, "panic", {}, at)
   wait_answer("left/" .. event, 1)

@@ -18,7 +18,7 @@ for _, fault in ipairs(FAULTS) do
   wait(2)
   wait_state("left:copying", 0)
   local s = sample{ every = 0.001, name = fault, signals = {
-    x = "left/World.robot1_tool_twist.v[0]", y = "left/World.robot1_tool_twist.v[1]", z = "left/World.robot1_tool_twist.v[2]",
+    x = "World.robot1_tool_twist.v[0]", y = "World.robot1_tool_twist.v[1]", z = "World.robot1_tool_twist.v[2]",
     mode = "left/youbot.control_mode", engaged = "left/Cart_Impedance.engaged", active = "left/Cart_Impedance.active" } }
   local at = now() + 0.25
   inject("left/youbot", fault, {}, at)

@@ -5,21 +5,21 @@
 
 local STIFFNESS = 150
 
-deploy("../observed/coupling.yaml")
+deploy("../../deployments/youbot_coupling.yaml")
 
 local function hand(robot, script) set(robot .. "/Operator.script", script, { force = true, within = 1 }) end
 local function apart()
   local sum = 0
   for axis = 0, 2 do
-    local p = "/World.robot1_tool_pose.p[" .. axis .. "]"
-    sum = sum + (signal("left" .. p) - signal("right" .. p))^2
+    local p = "_tool_pose.p[" .. axis .. "]"
+    sum = sum + (signal("World.robot1" .. p) - signal("World.robot2" .. p))^2
   end
   return math.sqrt(sum)
 end
 
 -- A tenth of the joints' friction, most of that compensated: else it holds the tools where they are, and hides what the coupling does.
-for _, robot in ipairs{ "left", "right" } do
-  set(robot .. "/World.robot1_friction_scale", 0.1, { force = true, within = 1 })
+for number, robot in ipairs{ "left", "right" } do
+  set("World.robot" .. number .. "_friction_scale", 0.1, { force = true, within = 1 })
   set(robot .. "/Dynamics.friction_comp", 0.09, { force = true, within = 1 })
 end
 

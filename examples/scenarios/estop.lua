@@ -6,6 +6,7 @@
 deploy("../../deployments/youbot_coupling.yaml")
 
 local ROBOTS = { "left", "right" }
+local WORLD = { left = "World.robot1_", right = "World.robot2_" }
 local function both(event) for _, robot in ipairs(ROBOTS) do raise(robot .. "/" .. event) end end
 local function until_both(state, seconds) for _, robot in ipairs(ROBOTS) do wait_state(robot .. ":" .. state, seconds) end end
 local function stopped() raise("e_estop") wait(0.5) end
@@ -59,7 +60,7 @@ local worst = { heard = 0, speed = 0, step = 0 }
 for number, place in ipairs(PLACES) do
   local name, go = table.unpack(place)
   go_down()
-  wait_state("youbot_coupling:idle", 20)
+  wait_state("pair:idle", 20)
   assert(#stack() == 0, "something is left")
   raise("e_start")
   go()
@@ -67,7 +68,7 @@ for number, place in ipairs(PLACES) do
   local signals = {}
   for _, robot in ipairs(ROBOTS) do
     for i, axis in ipairs{ "x", "y", "z" } do
-      signals[robot .. "_" .. axis] = robot .. "/World.robot1_tool_twist.v[" .. i - 1 .. "]"
+      signals[robot .. "_" .. axis] = WORLD[robot] .. "tool_twist.v[" .. i - 1 .. "]"
     end
     for joint = 0, 4 do signals[robot .. "_torque_" .. joint] = robot .. "/youbot.jointstate.eff[" .. joint .. "]" end
   end

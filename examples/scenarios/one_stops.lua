@@ -24,7 +24,7 @@ raise("left/e_reset")
 wait_state("left:stranded.before_parking", 1)
 raise("e_shutdown")
 wait_answer("left/park.ok", 8)
-wait_state("youbot_coupling:idle", 5)
+wait_state("pair:idle", 5)
 local components = 0
 for _ in pairs(system().components) do components = components + 1 end
 expect{ name = "left over: components", value = components, max = 0 }

@@ -18,8 +18,8 @@ for number, push in ipairs(PUSHES) do
   wait(1)
   local signals = {}
   for i, axis in ipairs{ "x", "y", "z" } do
-    signals["v" .. axis] = "left/World.robot1_tool_twist.v[" .. i - 1 .. "]"
-    signals["p" .. axis] = "left/World.robot1_tool_pose.p[" .. i - 1 .. "]"
+    signals["v" .. axis] = "World.robot1_tool_twist.v[" .. i - 1 .. "]"
+    signals["p" .. axis] = "World.robot1_tool_pose.p[" .. i - 1 .. "]"
   end
   for joint = 0, 4 do
     signals["q" .. joint] = "left/youbot.jointstate.vel[" .. joint .. "]"

@@ -14,10 +14,10 @@ local DEAD = {
 }
 
 deploy("../../deployments/youbot_coupling.yaml")
-for axis = 0, 2 do signal("left/World.robot1_tool_pose.p[" .. axis .. "]") end
+for axis = 0, 2 do signal("World.robot1_tool_pose.p[" .. axis .. "]") end
 local function place()
   local p = {}
-  for axis = 0, 2 do p[axis + 1] = signal("left/World.robot1_tool_pose.p[" .. axis .. "]") end
+  for axis = 0, 2 do p[axis + 1] = signal("World.robot1_tool_pose.p[" .. axis .. "]") end
   return p
 end
 

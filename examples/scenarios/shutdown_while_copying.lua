@@ -16,7 +16,7 @@ end
 local s = sample{ every = 0.001, signals = { x = "left/youbot.odometry.vx", y = "left/youbot.odometry.vy" } }
 wait(0.5)
 expect{ name = "the base moves while it parks", value = math.max(math.abs(s:last("x")), math.abs(s:last("y"))), max = 0.001, unit = "m/s" }
-wait_state("youbot_coupling:idle", 20)
+wait_state("pair:idle", 20)
 figure{ name = "down after", value = now() - at, unit = "s" }
 local components, connections = 0, 0
 for _ in pairs(system().components) do components = components + 1 end

@@ -4,7 +4,7 @@ use super::Checked;
 use super::platforms::{Make, Making};
 use crate::functions::Opener;
 use crate::limits;
-use crate::model::{Coordinator, Deployment, FaultKind, Findings, SimulatedReaction, StepFault};
+use crate::model::{Coordinator, Deployment, FaultKind, Finding, Findings, Severity, SimulatedReaction, StepFault};
 use crate::platform::Platform;
 use crate::platform::simulated::{self, Fault, FaultRule, Simulated, StepPattern};
 use crate::session::{Session, SessionSetup};
@@ -30,6 +30,12 @@ pub enum StartError {
         name: String,
         /// Each difference.
         findings: Findings,
+    },
+    /// It is a part of something larger, and cannot do without what its parent connects.
+    #[error("{}", .finding.message)]
+    Part {
+        /// What says so (`deploy::part`).
+        finding: Box<Finding>,
     },
     /// The functions of the coordinator could not be opened.
     #[error("the coordinator's functions cannot be run: {why}")]
@@ -80,7 +86,7 @@ pub(super) fn rule(fault: &StepFault) -> FaultRule {
 /// Makes the deployment's platform and starts its session. Nothing happens until it is brought up.
 ///
 /// # Errors
-/// When the platform cannot be made, or the functions of a coordinator cannot be run.
+/// When the deployment is a part of something larger, the platform cannot be made, or the functions of a coordinator cannot be run.
 pub fn start(checked: &Checked, clock: &Clock) -> Result<Arc<Session>, StartError> {
     start_open(checked, clock, Played::AsWritten).map(|(session, _)| session)
 }
@@ -103,6 +109,9 @@ pub(super) fn start_open(
     played: Played,
 ) -> Result<(Arc<Session>, Option<Simulated>), StartError> {
     let deployment = &checked.deployment;
+    if let Some(finding) = crate::check::part(deployment, &checked.catalogue, Severity::Error) {
+        return Err(StartError::Part { finding: Box::new(finding) });
+    }
     // Once here, to say what is wrong; then on each coordinator's own thread, from the same text.
     for opener in openers(checked).into_iter().flatten() {
         opener.open(None).map_err(|failure| StartError::Functions { why: failure.to_string() })?;

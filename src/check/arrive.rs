@@ -41,14 +41,17 @@ impl Product<'_> {
             self.forked |= states.len() > limits::CHECK_FORKS;
             states.truncate(limits::CHECK_FORKS);
         }
-        for name in &reaction.emitted {
+        for emitted in &reaction.emitted {
+            let name = emitted.event;
             for state in &mut states {
-                if self.parent.as_ref().is_some_and(|parent| parent.hears.contains(name)) {
-                    state.told.push(*name);
+                if self.parent.as_ref().is_some_and(|parent| parent.hears.contains(&name)) {
+                    state.told.push(name);
                 }
-                self.tells_child(state, *name);
-                self.confirm(state, *name);
-                self.spread(state, *name, Some(by));
+                self.tells_child(state, name);
+                self.confirm(state, name);
+                let hearers = self.hearers(state, name, Some(by));
+                self.spread_to(state, &hearers);
+                self.offers_child(state, by, *emitted, &hearers);
             }
         }
         states
@@ -67,6 +70,7 @@ impl Product<'_> {
         if state.seldom.is_nothing() {
             return;
         }
+        self.forgets_offered(state, by, left);
         state.change(|seldom| {
             seldom.safe.update(gone, |request| request.tag = (0, 0));
             seldom.due.update(|(request, _)| gone(request), |(request, _)| request.tag = (0, 0));

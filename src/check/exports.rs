@@ -186,7 +186,7 @@ impl Graph<'_, '_> {
                     let timed: Vec<EventId> = member.offers(leaf).iter().copied().collect();
                     for event in events.iter().chain(&timed) {
                         let reaction = member.react(leaf, *event);
-                        if reaction.emitted.contains(&from) {
+                        if reaction.emits(from) {
                             emits.entry(number).or_default().insert((leaf.index(), reaction.leaf.index()));
                         }
                     }

@@ -78,6 +78,7 @@ impl Product<'_> {
             let mut next = state.clone();
             let stays = state.inbox.iter().enumerate().filter(|(at, _)| !places.contains(at));
             next.inbox = stays.map(|(_, lies)| *lies).collect();
+            self.takes_offered(&mut next, number, event, places.len());
             self.hear(next, number, event, Move::Taken(index(number), event), nexts);
         }
     }

@@ -38,7 +38,7 @@ fn too_early(own: &Deployment, subsystem: &Subsystem, charts: &[&Chart]) -> Opti
     let (until, says) = (leaving.until.within(subsystem.name), leaving.says.within(subsystem.name));
     let (end, site) = (subsystem.own.shutdown.event, raised(charts, until)?);
     let ends = end.within(subsystem.name);
-    let both = |step: &Macrostep| step.emitted.contains(&ends) && step.emitted.contains(&until);
+    let both = |step: &Macrostep| step.emits(ends) && step.emits(until);
     let together = charts.iter().any(|chart| {
         let mut reactions = Reactions::new(own, chart, &[], Requester::Operator, None);
         let Some(first) = reactions.enter() else { return false };

@@ -38,6 +38,7 @@ mod failing;
 mod follow;
 mod heard;
 mod held;
+mod ignored;
 mod inbox;
 mod interface;
 mod interned;
@@ -111,4 +112,5 @@ pub use shown::why_no_way;
 #[cfg(any(test, feature = "internals"))]
 pub use shown::{FOLLOWED, READ};
 pub use trace::{Again, Answered, Does, Happened, HeardEvent, MoveReplay, Place, TraceStep};
+pub use undriven::part;
 pub use verdict::CheckVerdict;

@@ -25,9 +25,25 @@ pub struct Macrostep {
     /// States that were left, at least once.
     pub left: Vec<NodeId>,
     /// Names that were raised and ask for nothing, in order.
-    pub emitted: Vec<EventName>,
+    pub emitted: Vec<Emitted>,
     /// Its number among those of the same coordinator.
     pub number: u32,
+}
+
+/// A name that was raised and asks for nothing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Emitted {
+    /// The name.
+    pub event: EventName,
+    /// The state that hears what is answered to it; none: that was left in the same step.
+    pub owner: Option<NodeId>,
+}
+
+impl Macrostep {
+    /// Whether this was raised.
+    pub fn emits(&self, event: EventName) -> bool {
+        self.emitted.iter().any(|emitted| emitted.event == event)
+    }
 }
 
 /// The number of the first entry.
@@ -159,7 +175,7 @@ struct MacrostepRecorder<'a> {
     batch: Batch,
     handed: Vec<Batch>,
     left: Vec<NodeId>,
-    emitted: Vec<EventName>,
+    emitted: Vec<Emitted>,
 }
 
 impl MacrostepRecorder<'_> {
@@ -174,6 +190,7 @@ impl Hook for MacrostepRecorder<'_> {
         let requests = self.handed.iter_mut().chain([&mut self.batch]).flat_map(|batch| &mut batch.requests);
         let left = requests.filter(|request| is_left(request, self.by, &[state]));
         left.for_each(|request| request.tag = (0, 0));
+        self.emitted.iter_mut().for_each(|emitted| _ = emitted.owner.take_if(|owner| *owner == state));
         if !self.left.contains(&state) {
             self.left.push(state);
         }
@@ -215,7 +232,7 @@ impl Hook for MacrostepRecorder<'_> {
                 let tag = (raised.owner.index() as u64 + 1, 0);
                 self.batch.requests.push(Request { scope, tag, ..Request::new(RequestId(0), ask, self.by) });
             }
-            None => self.emitted.push(raised.name),
+            None => self.emitted.push(Emitted { event: raised.name, owner: Some(raised.owner) }),
         }
     }
 }

@@ -16,7 +16,7 @@ use super::{
 };
 use crate::limits;
 use crate::model::codes::{CLASH, POST_ON_DESTROYED, PRE_ON_CREATED, TOUCHES_DESTROYED};
-use crate::model::{Catalogue, Code, ConfigId, Deployment, EventName, Finding, Findings, StepFault};
+use crate::model::{Catalogue, Code, ConfigId, Deployment, EventName, Finding, Findings, Severity, StepFault};
 use crate::statechart::Chart;
 use rustc_hash::FxHashSet;
 use std::cmp::Reverse;
@@ -30,11 +30,14 @@ pub fn run(deployment: impl Into<Arc<Deployment>>, catalogue: &Catalogue) -> Rep
 
 /// The same with more effort, or less.
 pub fn run_with(deployment: impl Into<Arc<Deployment>>, catalogue: &Catalogue, effort: Effort<'_>) -> Report {
+    let deployment = deployment.into();
+    let part = undriven::part(&deployment, catalogue, Severity::Info);
     let one = |own, catalogue: &Catalogue, around: &Neighbours| run_one(own, catalogue, effort, around);
-    let (report, _) = match effort.together {
-        true => one(deployment.into(), catalogue, &Neighbours::default()),
-        false => composed::run(deployment.into(), catalogue, &Neighbours::default(), &one),
+    let (mut report, _) = match effort.together {
+        true => one(deployment, catalogue, &Neighbours::default()),
+        false => composed::run(deployment, catalogue, &Neighbours::default(), &one),
     };
+    report.findings.extend(part);
     report
 }
 

@@ -5,8 +5,9 @@
 
 use super::outcome::WorldId;
 use super::shared_list::SharedList;
-use crate::model::{ConfigId, Verdict};
+use crate::model::{ConfigId, EventName, Verdict};
 use crate::stack::{Batch, Request};
+use crate::statechart::NodeId;
 use std::rc::Rc;
 
 /// A batch under way that a safe configuration has interrupted.
@@ -27,6 +28,19 @@ pub struct Unconfirmed {
     pub place: u8,
     /// The request that pushed it.
     pub request: Request,
+}
+
+/// An event that a parent's coordinator has raised for a subsystem, until it was taken, or that it was ignored was heard.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct RaisedForChild {
+    /// The event.
+    pub event: EventName,
+    /// The coordinator that raised it.
+    pub by: u8,
+    /// Its state that hears that it was ignored.
+    pub owner: NodeId,
+    /// The coordinators that have still to come to it, by their bits; none: it was ignored, and that is not heard yet.
+    pub waits: u64,
 }
 
 /// What few states have.
@@ -56,6 +70,8 @@ pub struct Seldom {
     pub in_transit: SharedList<Batch>,
     /// Coordinators that have moved since the inboxes were empty, by their bits. Kept only where events come meanwhile.
     pub moved: u64,
+    /// Events that were raised for subsystems and are not taken yet. Kept only where these are followed with their parent.
+    pub offered: SharedList<RaisedForChild>,
 }
 
 /// Nothing of it.
@@ -71,6 +87,7 @@ pub const NOTHING: &Seldom = &Seldom {
     over: SharedList::new(),
     in_transit: SharedList::new(),
     moved: 0,
+    offered: SharedList::new(),
 };
 
 /// The same as a state has it: none where it has nothing of it.

@@ -1,9 +1,12 @@
-//! In-ports that nothing drives: no configuration connects them or writes them, and no operator may.
+//! In-ports that nothing drives: no configuration connects them or writes them, and no operator may. Where one that is needed is exported
+//! the parent drives it, so the file is a part of something larger.
 
 use super::links::links;
 use super::universe::Universe;
-use crate::model::codes::{DEPLOY_PORT_REQUIRED, DEPLOY_PORT_UNDRIVEN};
-use crate::model::{ChangeKind, Deployment, Direction, Finding, Findings, MemberRef, OperatorMay, Origin};
+use crate::model::codes::{DEPLOY_PART, DEPLOY_PORT_REQUIRED, DEPLOY_PORT_UNDRIVEN};
+use crate::model::{
+    Catalogue, ChangeKind, Deployment, Direction, Finding, Findings, MemberRef, OperatorMay, Origin, Severity,
+};
 use rustc_hash::FxHashSet;
 
 /// Names that a finding shows; the rest is counted.
@@ -37,6 +40,38 @@ pub fn check(deployment: &Deployment, universe: &Universe) -> Findings {
         findings.push(note(&others, first));
     }
     findings
+}
+
+/// What says that a deployment is a part of something larger: it exports in-ports that its components need, for a parent to drive. Where code runs
+/// it is not deployed alone (an error), but it is checked, planned and imitated (a note).
+pub fn part(deployment: &Deployment, catalogue: &Catalogue, severity: Severity) -> Option<Finding> {
+    if deployment.kind.imitates || deployment.interface.exports.is_empty() {
+        return None;
+    }
+    let universe = Universe::new(deployment, catalogue);
+    let needs = |of: MemberRef| {
+        let types = universe.of(of.component).iter().filter_map(|creation| creation.description.as_deref());
+        let mut ports = types.flat_map(|ty| &ty.ports).filter(|(name, _)| **name == of.member);
+        ports.any(|(_, port)| port.direction == Direction::In && port.required)
+    };
+    let mut needed = deployment.interface.exports.iter().filter(|(_, export)| needs(export.of)).peekable();
+    let origin = needed.peek()?.1.origin;
+    let names: Vec<String> = needed.map(|(name, export)| format!("`{name}` ({})", export.of)).collect();
+    let (drives, needs) = match names.len() {
+        1 => ("an in-port that its component needs is", "it"),
+        _ => ("in-ports that their components need are", "them"),
+    };
+    let message = format!(
+        "`{}` is a part of something larger: {drives} exported, for a parent to drive {needs}: {}",
+        deployment.name,
+        names.join(", ")
+    );
+    Some(
+        Finding::new(severity, DEPLOY_PART, message)
+            .at(origin)
+            .path("exports")
+            .help("deploy a file that has it among its `subsystems` and connects this; `--platform simulated` of `davit run` imitates it alone"),
+    )
 }
 
 /// What some configuration connects or writes, or an operator may set.

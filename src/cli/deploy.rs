@@ -116,6 +116,7 @@ impl Args {
                 error.to_string(),
                 "declare the types as the platform has them, or give it what the deployment was written for",
             ),
+            StartError::Part { finding } => CommandFailure::found(vec![*finding], checked.sources.clone()),
             StartError::Functions { why } => CommandFailure::no(
                 FUNCTIONS_NOT_OPENED,
                 format!("the coordinator's functions cannot be run: {why}"),

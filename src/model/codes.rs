@@ -591,6 +591,11 @@ codes! {
     DEPLOY_NO_PLATFORM = "deploy::no_platform", "the platform cannot be made",
         "The platform that the deployment names said that it cannot be had now: a device that is not there, a middleware that does \
          not answer. The message has its own words. Nothing was brought up.";
+    DEPLOY_PART = "deploy::part", "the deployment is a part of something larger",
+        "The file exports an in-port that its component's type declares `required: true`: a parent is to drive it, and nothing in the file does. \
+         Such a file is a subsystem of another one. It is checked, planned, drawn and simulated by itself (`davit check` notes what it is), but \
+         not deployed where components run: without what its parent connects it cannot do what it is there for. Deploy a file that has it among its \
+         `subsystems`, or, to have it alone, connect or write the port in the file itself and export it no more.";
     DEPLOY_PLATFORM_OPTION = "deploy::platform_option", "an option of the platform is wrong",
         "`platform: { NAME: { … } }` gives the platform options. Which ones there are, of which type, and which must be given, is \
          what the program says that brings the platform. The built-in platforms have none.";

@@ -17,7 +17,7 @@ deploy:   { event: e_start, up: on, failed: [bad], within_s: 10 }
 shutdown: { event: e_shutdown, down: idle, within_s: 10 }
 ";
 
-const COORDINATOR: &str = r#"return state {
+pub const COORDINATOR: &str = r#"return state {
   idle = state {}, raising = state {}, on = state {}, bad = state {}, lowering = state { entry = "duo/e_shutdown" },
   trans { src = "initial", tgt = "idle" },
   trans { src = "idle", tgt = "raising", events = { "e_start" }, effect = { "duo/e_start" } },

@@ -1,9 +1,10 @@
 //! The story of a deployment in simulated time, on both platforms.
 
 use davit::app::script::{self, Interrupt, ScriptOptions};
-use davit::app::{self, Checked};
+use davit::app::{self, Checked, StartError};
 use davit::lang::LoadOptions;
 use davit::libraries;
+use davit::model::{Severity, codes};
 use davit::session::rpc;
 use davit::session::service::SessionService;
 use davit::session::socket::Service;
@@ -64,14 +65,37 @@ fn up_and_down(file: &str) -> Vec<String> {
 fn every_deployment_comes_up_and_goes_down_to_nothing() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("deployments");
     let mut seen = 0;
+    let mut parts = Vec::new();
     for entry in std::fs::read_dir(folder).unwrap() {
         let name = entry.unwrap().file_name().into_string().unwrap();
-        if name.ends_with(".yaml") {
-            up_and_down(&format!("deployments/{name}"));
+        let file = format!("deployments/{name}");
+        if !name.ends_with(".yaml") {
+            continue;
+        }
+        let checked = checked(&file);
+        if davit::check::part(&checked.deployment, &checked.catalogue, Severity::Error).is_some() {
+            parts.push(name);
+        } else {
+            up_and_down(&file);
             seen += 1;
         }
     }
-    assert!(seen >= 4, "{seen}");
+    assert!(seen >= 5, "{seen}");
+    assert_eq!(parts, ["youbot_robot.yaml"], "a part of something larger comes up in that");
+}
+
+#[test]
+fn a_part_is_refused_alone_and_says_what_it_lacks() {
+    let Err(StartError::Part { finding }) = app::start(&checked("deployments/youbot_robot.yaml"), &Clock::simulated())
+    else {
+        panic!("it needs a world");
+    };
+    assert!(finding.is_error() && finding.code == codes::DEPLOY_PART, "{finding:?}");
+    for needed in ["`arm_state` (youbot.plant_state)", "`rx` (Link_Rx.rx)"] {
+        assert!(finding.message.contains(needed), "{}", finding.message);
+    }
+    // What it may do without, and what it gives out, is not missing.
+    assert!(!finding.message.contains("hand_pose") && !finding.message.contains("tx:"), "{}", finding.message);
 }
 
 #[test]

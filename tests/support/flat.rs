@@ -114,11 +114,17 @@ fn configurations(text: &str) -> impl Iterator<Item = String> + '_ {
     text.lines().filter_map(|line| Some(line.split_once("= Configuration")?.0.trim().to_owned()))
 }
 
+/// A coordinator's text without what it tells to whoever it is a part of, and waits for.
+fn alone(text: &str) -> String {
+    let text = text.replace("{ \"e_built\", \"connect_all\" }", "\"connect_all\"").replace("e_released", "e_done");
+    text.replace("state { entry = \"e_leaving\" }", "state {}")
+}
+
 /// Writes the deployment of so many robots into a folder.
 pub fn youbots(folder: &Path, robots: &[&str]) -> PathBuf {
     let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/youbot");
     let names = ["coupling.lua", "configurations.lua", "coordinator.lua", "monitors.lua"];
-    let read = |name: &str| std::fs::read_to_string(shipped.join(name)).expect("it is shipped");
+    let read = |name: &str| alone(&std::fs::read_to_string(shipped.join(name)).expect("it is shipped"));
     let texts = names.map(read);
     let configurations: Vec<String> = texts[..2].iter().flat_map(|text| configurations(text)).collect();
     for robot in robots {

@@ -81,7 +81,7 @@ fn seconds(time: Time) -> f64 {
 
 #[test]
 fn both_come_up_side_by_side_and_couple() {
-    let alone = up("youbot_robot.yaml", |one| seconds(one.clock.now()));
+    let alone = up("youbot_arm.yaml", |one| seconds(one.clock.now()));
     up("youbot_coupling.yaml", |both| {
         let took = seconds(both.clock.now());
         assert!(took <= 1.1 * alone, "one takes {alone} s, both {took} s");
@@ -121,7 +121,7 @@ fn each_is_told_of_once_and_only_its_parent_hears() {
         // Nothing of one's own is heard under the name that it has in its file.
         let bare = |event: &str| !event.contains('/') && event != "e_start";
         assert!(!both.events().iter().any(|(_, event)| bare(event)), "{:?}", both.events());
-        let joined = both.state_since("youbot_coupling:root.alive.joined").unwrap();
+        let joined = both.state_since("pair:root.alive.joined").unwrap();
         let last = both.events().iter().filter(|(_, event)| event.ends_with("/up")).map(|(at, _)| *at).max().unwrap();
         assert!(joined >= last);
     });

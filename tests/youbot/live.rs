@@ -113,11 +113,16 @@ fn probed(id: i64, change: impl Fn(String) -> String) -> String {
     let each = |verb: &str| LOOKS.map(|(from, to)| format!("\n{verb}(\"{from}\", \"Probe.{to}\"),")).concat();
     let created =
         format!("\ncreate(\"Probe\", \"test.Probe\", {{ activity = \"control\", properties = {{ id = {id} }} }}),");
-    let text = behind(&text, "create_core = Configuration { description = \"the control loop\",", &created);
+    let text =
+        behind(&text, "create_core = Configuration(with_stand_in({ description = \"the control loop\",", &created);
     let text = behind(&text, "\n  connect_all = Configuration(with_stand_in({", &each("connect"));
     let text = behind(&text, "disconnect_all = Configuration(with_stand_in({", &each("disconnect"));
     let text = behind(&text, "destroy_all = Configuration(with_stand_in({", "destroy(\"Probe\"),");
-    change(behind(&text, "post_conf_state = { \"World:running\", \"youbot:running\"", ", \"Probe:running\""))
+    change(behind(
+        &text,
+        "post_conf_state = stand_in and { \"World:running\", \"youbot:running\"",
+        ", \"Probe:running\"",
+    ))
 }
 
 /// A file with the probe in it, read and checked once for all that want the same, one after the other: to check it takes

@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Each with what is set for it here: what takes a minute in the file is shorter.
-const SCENARIOS: [(&str, &[(&str, &str)]); 19] = [
+const SCENARIOS: [(&str, &[(&str, &str)]); 20] = [
     ("bring_up", &[]),
     ("crash", &[]),
     ("driver", &[]),
@@ -25,6 +25,7 @@ const SCENARIOS: [(&str, &[(&str, &str)]); 19] = [
     ("repair", &[]),
     ("saturated", &[]),
     ("shutdown_while_copying", &[]),
+    ("through_the_world", &[]),
     ("tracking", &[("seconds", "20")]),
     ("tuned", &[]),
     ("udp", &[]),
@@ -145,6 +146,11 @@ fn saturated() {
 #[test]
 fn shutdown_while_copying() {
     run("shutdown_while_copying");
+}
+
+#[test]
+fn through_the_world() {
+    run("through_the_world");
 }
 
 #[test]

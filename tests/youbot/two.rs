@@ -83,7 +83,13 @@ impl Robot {
     /// One that was led down alone stays down: until the other one is down as well, what it did before is in force, and `check` finds
     /// what is refused because of that when it is brought up again.
     fn coordinator(&self) -> String {
-        let mut text = shipped("coordinator.lua");
+        // Nobody waits for its parts, nor has hold of them.
+        let mut text = shipped("coordinator.lua")
+            .replace("{ \"e_built\", \"connect_all\" }", "\"connect_all\"")
+            .replace("letting_go     = state { entry = \"e_leaving\" }", "letting_go = state {}")
+            .replace("letting_go   = state { entry = \"e_leaving\" }", "letting_go = state {}")
+            .replace("e_released", "e_done");
+        assert!(!text.contains("e_built") && !text.contains("e_leaving"));
         for (once, instead) in [
             (
                 "  idle = state {},",
@@ -105,7 +111,7 @@ impl Robot {
         literals(&text, |word| {
             let (name, _) = word.split_at(word.find('.').unwrap_or(word.len()));
             match word {
-                "e_start" => word.to_owned(),
+                "e_start" | "e_done" => word.to_owned(),
                 "e_shutdown" => format!("e_shutdown\", \"e_{}_down", self.side),
                 _ if word.starts_with("e_") => format!("e_{}_{}", self.side, &word[2..]),
                 _ if self.ids.iter().any(|id| id == name) => format!("{}_{word}", self.side),

@@ -12,16 +12,50 @@ pub const PLANT_STEP: f64 = 0.0005;
 /// Steps taken at once at most: a world that is called late loses time, it does not make up for it.
 const STEPS_AT_ONCE: f64 = 100.0;
 
-/// A table and a wall, which the tool point touches without friction.
+/// A bar across the world's x axis, on rails along it: what one tool pushes, a tool on its other side feels.
+#[derive(Debug, Clone, Copy)]
+pub struct Bar {
+    /// Where its middle is, in m.
+    pub at: f64,
+    /// In m/s.
+    pub speed: f64,
+    /// In kg.
+    pub mass: f64,
+    /// Of the rails, in N s/m.
+    pub damping: f64,
+}
+
+/// Half of a bar's thickness, in m: more than any tool is pressed into it.
+pub const BAR_HALF: f64 = 0.02;
+
+impl Bar {
+    /// How far a tool is inside of it, in m, and which way that is out of it (-1 or 1).
+    fn penetration(&self, x: f64) -> (f64, f64) {
+        match x < self.at {
+            true => (x - (self.at - BAR_HALF), -1.0),
+            false => (self.at + BAR_HALF - x, 1.0),
+        }
+    }
+
+    /// Moves on by `dt` seconds under what the tools do to it, in N.
+    pub fn step(&mut self, push: f64, dt: f64) {
+        self.speed = (self.speed + push / self.mass * dt) / (1.0 + self.damping / self.mass * dt);
+        self.at += self.speed * dt;
+    }
+}
+
+/// A table, a wall and a bar, which the tool point touches without friction.
 #[derive(Debug, Clone, Copy)]
 pub struct Surroundings {
     /// Height of the table, in m.
     pub table: f64,
     /// Where the wall stands, across the world's x axis, in m; it is behind that.
     pub wall: f64,
-    /// Of both, in N/m.
+    /// The bar; none: there is none within reach.
+    pub bar: Option<Bar>,
+    /// Of all, in N/m.
     pub stiffness: f64,
-    /// Of both, in N s/m.
+    /// Of all, in N s/m.
     pub damping: f64,
 }
 
@@ -30,7 +64,7 @@ pub const FAR: f64 = 100.0;
 
 impl Default for Surroundings {
     fn default() -> Self {
-        Self { table: -FAR, wall: FAR, stiffness: 10_000.0, damping: 100.0 }
+        Self { table: -FAR, wall: FAR, bar: None, stiffness: 10_000.0, damping: 100.0 }
     }
 }
 
@@ -40,15 +74,27 @@ impl Surroundings {
         [self.table - position.z, position.x - self.wall]
     }
 
-    /// What they do to a tool, in N.
-    pub fn force(&self, position: &Vector3<f64>, velocity: &Vector3<f64>) -> Vector3<f64> {
-        let inside = self.penetration(position);
-        let press = |inside: f64, speed: f64| match inside > 0.0 {
+    /// What a tool is pressed out with that is so far inside and goes in so fast, in N.
+    fn press(&self, inside: f64, speed: f64) -> f64 {
+        match inside > 0.0 {
             // Nothing sticks.
             true => (self.stiffness * inside + self.damping * speed).max(0.0),
             false => 0.0,
-        };
-        Vector3::new(-press(inside[1], velocity.x), 0.0, press(inside[0], -velocity.z))
+        }
+    }
+
+    /// What table and wall do to a tool, in N.
+    pub fn force(&self, position: &Vector3<f64>, velocity: &Vector3<f64>) -> Vector3<f64> {
+        let inside = self.penetration(position);
+        Vector3::new(-self.press(inside[1], velocity.x), 0.0, self.press(inside[0], -velocity.z))
+    }
+
+    /// What the bar does to a tool along the x axis, in N.
+    pub fn bar_force(&self, position: &Vector3<f64>, velocity: &Vector3<f64>) -> f64 {
+        self.bar.map_or(0.0, |bar| {
+            let (inside, out) = bar.penetration(position.x);
+            out * self.press(inside, out * (bar.speed - velocity.x))
+        })
     }
 }
 
@@ -63,6 +109,8 @@ pub struct RobotBody {
     pub surroundings: Surroundings,
     /// What it does to the tool, in N.
     pub contact: Vector3<f64>,
+    /// What the tool did to the bar along the x axis, over the steps taken at once, in N.
+    pub on_bar: f64,
     /// Time constant with which the motors' torques follow what is wanted, in s; 0: at once.
     pub torque_lag: f64,
     /// What the motors give now, in N m.
@@ -77,6 +125,7 @@ impl RobotBody {
             base: BasePlant::default(),
             surroundings: Surroundings::default(),
             contact: Vector3::zeros(),
+            on_bar: 0.0,
             torque_lag: 0.0,
             given: J5::zeros(),
         }
@@ -93,9 +142,13 @@ impl RobotBody {
         let steps = (dt / PLANT_STEP).round().clamp(1.0, STEPS_AT_ONCE);
         let step = (dt / steps).min(2.0 * PLANT_STEP);
         let mut done = 0.0;
+        self.on_bar = 0.0;
         while done < steps {
             let tool = self.tool();
             self.contact = self.surroundings.force(&tool.position, &tool.velocity);
+            let bar = self.surroundings.bar_force(&tool.position, &tool.velocity);
+            self.contact.x += bar;
+            self.on_bar -= bar / steps;
             let force = base_rotation(self.base.pose).inverse() * (push + self.contact);
             let motion = self.base.step(twist, step);
             // Shorted windings have no torque of the drives' to follow.
@@ -132,6 +185,28 @@ mod tests {
             body.contact
         );
         assert!(pushed(&mut body, -30.0) < -0.01 && body.contact == Vector3::zeros());
+    }
+
+    #[test]
+    fn what_one_tool_pushes_the_other_one_feels() {
+        let mut bodies = [0, 1].map(|_| RobotBody::new(radians(WORKING_POSE_DEG), 1.0));
+        let (from, places) = (bodies[0].tool().position.x, [0.0, 0.06]);
+        let mut bar = Bar { at: from + 0.03, speed: 0.0, mass: 1.0, damping: 2.0 };
+        let mut most = 0.0_f64;
+        for _ in 0..2000 {
+            let push = [30.0, 0.0].map(|push| Vector3::new(push, 0.0, 0.0));
+            for ((body, push), place) in bodies.iter_mut().zip(&push).zip(places) {
+                body.surroundings.bar = Some(Bar { at: bar.at - place, ..bar });
+                let torque = body.arm.model.gravity(&body.arm.posture());
+                body.advance(&torque, Twist2::default(), push, false, PLANT_STEP);
+            }
+            bar.step(bodies.iter().map(|body| body.on_bar).sum(), PLANT_STEP);
+            most = most.max(bodies[1].contact.x);
+        }
+        let moved = bodies.each_ref().map(|body| body.tool().position.x - from);
+        // One on each side of it, all three together, and nothing is felt across a gap.
+        assert!(moved[1] > 0.05 && most > 3.0, "{moved:?} {most}");
+        assert!((moved[0] - moved[1] - 0.02).abs() < 0.005 && moved[0] < bar.at - from, "{moved:?} {bar:?}");
     }
 
     #[test]

@@ -1,5 +1,9 @@
 //! `youbot.Driver`: the robot's driver.
 
+mod bus;
+mod faults;
+mod operations;
+
 use super::aged;
 use super::samples::{DriverState, JointState, MotorStates, Odometry, PlantCommand, PlantState, Twist, stamp};
 use crate::libraries::youbot::drives::{DriveHappening, DriveMode, DriveOutput, DriveParameters, Drives, Measured};
@@ -7,10 +11,10 @@ use crate::libraries::youbot::motors::{Encoders, HeatChange, HeatLimit};
 use crate::libraries::youbot::parameters::{GEAR, JOINTS, PARK_POSE_DEG, TORQUE_CONSTANT, TORQUE_LIMIT};
 use crate::libraries::youbot::rigid_body::{J5, radians};
 use crate::model::{EventName, Tunable};
-use crate::runtime::{Builder, Component, Context, EventOut, Failure, In, OperationAnswer, Out, Prop, Ticket};
+use crate::runtime::{Builder, Component, Context, EventOut, In, Out, Prop, Ticket};
+use bus::BUS_TIMEOUT;
+use faults::{FAULTS, I2T};
 
-/// An arm that was not heard for so long is not there any more: the field bus has failed, in s.
-const BUS_TIMEOUT: f64 = 0.02;
 /// Drives that take torques are watched: when whoever does was not heard for so long it has stopped, in s.
 const UNWATCHED: f64 = 0.04;
 /// What lasts is told again so much later, as monitors do it: who was elsewhere when it began still hears of it. In s.
@@ -19,35 +23,6 @@ const AGAIN: f64 = 0.5;
 const HEATING: f64 = 1.5;
 const HEAT_TIME: f64 = 120.0;
 const AMBIENT: f64 = 25.0;
-
-/// The fault of a motor that gave too much for too long.
-const I2T: &str = "i2t";
-
-/// Faults that `comm_fault` injects: the property's value, the event, the flag.
-const FAULTS: [(&str, &str, i64); 9] = [
-    ("overcurrent", "e_OVERCURRENT", 0x01),
-    ("undervoltage", "e_UNDERVOLTAGE", 0x02),
-    ("hall", "e_HALL_ERR", 0x10),
-    ("sine_comm", "e_SINE_COMM_INIT_ERR", 0x100),
-    (I2T, "e_I2T_EXCEEDED", 0x200),
-    ("overtemp", "e_OVERTEMP", 0x04),
-    ("ec_timeout", "e_EC_TIMEOUT", 0x40),
-    ("encoder", "e_ENCODER_ERR", 0x20),
-    ("emergency", "e_EMERGENCY_STOP", 0x80),
-];
-
-/// What each of them is, for `davit types`.
-const FAULT_WORDS: [&str; FAULTS.len()] = [
-    "A motor takes too much current; the drives hold, e_OVERCURRENT.",
-    "The drives have too little voltage; they hold, e_UNDERVOLTAGE.",
-    "A Hall sensor fails; the drives hold, e_HALL_ERR.",
-    "A motor does not find its commutation; the drives hold, e_SINE_COMM_INIT_ERR.",
-    "A motor has taken much current for long; the drives hold, e_I2T_EXCEEDED.",
-    "A motor is too hot; the drives hold, e_OVERTEMP.",
-    "The field bus did not answer in time; the drives hold, e_EC_TIMEOUT.",
-    "An encoder tells nonsense; the drives hold, e_ENCODER_ERR.",
-    "Somebody pressed the emergency stop; the drives hold, e_EMERGENCY_STOP.",
-];
 
 struct Events {
     soft_limit: EventName,
@@ -94,6 +69,10 @@ pub struct Driver {
     counters: Encoders,
     heat: HeatLimit,
     running: bool,
+    /// Whether the arm has been heard since it was started. Until then the drives are off, and nothing has failed.
+    arm_is_there: bool,
+    /// For how long a calibration has waited for the arm, in s.
+    waits_for_arm: Option<f64>,
     motors: MotorStates,
     bus: DriverState,
     task: Option<Ticket>,
@@ -109,7 +88,8 @@ impl Component for Driver {
     fn new(b: &mut Builder<Self>) -> Self {
         b.describe(
             "The youBot's driver: of an arm and a base that are in youbot.World. Drives start off; the arm then rests on its \
-             stops or sinks onto them. An arm that is not heard any more for 20 ms: e_EC_TIMEOUT.",
+             stops or sinks onto them. It may be started before its arm is there: the first to ask for it, the calibration, waits for it \
+             for a second. An arm that is not heard any more for 20 ms: e_EC_TIMEOUT.",
         )
         .actuator()
         .exclusive("ethercat:{ifname}")
@@ -124,105 +104,27 @@ impl Component for Driver {
             }
             Ok(())
         })
-        .on_start(|c, _| {
-            let Some(state) = c.plant_state.get() else {
-                return Err("the arm is not heard (plant_state): start the world that it is in first".into());
-            };
-            c.drives.measured = Measured { q: state.pos.into(), qd: state.vel.into() };
-            c.plant = state;
+        .on_start(|c, cx| {
+            let heard = aged(&mut c.plant_state, cx).filter(|(_, age)| *age <= BUS_TIMEOUT);
+            c.arm_is_there = heard.is_some();
+            if let Some((state, _)) = heard {
+                c.drives.measured = Measured { q: state.pos.into(), qd: state.vel.into() };
+                c.plant = state;
+            }
             c.running = true;
-            (c.unwatched, c.unheard) = (None, None);
+            (c.unwatched, c.unheard, c.waits_for_arm) = (None, None, None);
             Ok(())
         })
         .on_stop(|c, _| {
             c.running = false;
-            c.task = None;
+            (c.task, c.waits_for_arm) = (None, None);
             if !c.drives.switch_off() {
                 c.events.raise(c.names.dropped);
             }
             c.plant_command.write(PlantCommand { braked: true, ..PlantCommand::default() });
             Ok(())
         });
-        b.doc("Changes what the drives do: 0 off, 1 hold a position, 6 take torques.").operation(
-            "setControlMode",
-            |c, _, (mode,): (u8,)| match DriveMode::from_number(mode) {
-                Some(mode) => c.drives.set_mode(mode).map_or_else(OperationAnswer::failed, OperationAnswer::Done),
-                None => OperationAnswer::failed(format!("no control mode {mode}: 0, 1 or 6")),
-            },
-        );
-        b.doc("Finds the stops of joints 2 to 4; ends resting on them, drives off. Takes seconds.")
-            .no_effect()
-            .moves()
-            .operation("start_calibration", |c, cx, (): ()| c.begin(cx, Drives::calibrate));
-        b.doc("Moves the arm from its stops to the working pose and holds it there. Takes seconds.")
-            .undone_by("fold")
-            .moves()
-            .operation("unfold", |c, cx, (): ()| c.begin(cx, Drives::unfold));
-        b.doc("Moves the arm onto its stops. Takes seconds.")
-            .undone_by("unfold")
-            .moves()
-            .operation("fold", |c, cx, (): ()| c.begin(cx, Drives::fold));
-        b.doc(
-            "Has a fault happen once, by its name in comm_fault: as the world does it, with nothing written that would be a difference.",
-        )
-        .no_effect()
-        .operation("inject_fault", |c, _, (fault,): (String,)| match c.fail(&fault) {
-            true => OperationAnswer::Done(()),
-            false => OperationAnswer::failed(format!("no fault `{fault}`")),
-        });
-        b.doc("Forgets the drives' error flags.").no_effect().operation("clear_faults", |c, _, (): ()| {
-            c.motors.error_flags = 0;
-            OperationAnswer::Done(())
-        });
-        b.doc("The drives hold where they are, whatever is commanded; raises e_EMERGENCY_STOP.").no_effect().operation(
-            "emergency_stop",
-            |c, _, (): ()| {
-                c.task = None;
-                c.drives.hold();
-                c.events.raise(c.names.emergency);
-                OperationAnswer::Done(())
-            },
-        );
-        b.doc("Whatever moves comes to rest along a ramp and is held there; the base stands.")
-            .undone_by("release")
-            .operation("brake", |c, _, (): ()| {
-                c.task = None;
-                c.drives.brake();
-                OperationAnswer::Done(())
-            });
-        b.doc("The same, and nothing takes it back: for what moves although they were braked before.")
-            .no_effect()
-            .operation("stop", |c, _, (): ()| {
-                c.task = None;
-                c.drives.stop();
-                OperationAnswer::Done(())
-            });
-        b.doc(
-            "The drives take torques, as mode 6 which was set before says: for after they held by themselves. Fails while they \
-             brake and were not released.",
-        )
-        .no_effect()
-        .operation("resume", |c, _, (): ()| c.drives.resume().map_or_else(OperationAnswer::failed, OperationAnswer::Done));
-        b.doc("The drives take torques again if they did before they braked, for whatever reason; else they hold on.")
-            .undone_by("brake")
-            .operation("release", |c, _, (): ()| {
-                c.drives.release();
-                OperationAnswer::Done(())
-            });
-        b.doc("Whether torques are passed on also near the joints' limits.").operation(
-            "disable_jntlim_safety",
-            |c, _, (off,): (bool,)| {
-                c.drives.limit_safety = !off;
-                OperationAnswer::Done(())
-            },
-        );
-        for (fault, what) in FAULTS.iter().zip(FAULT_WORDS) {
-            let name = fault.0;
-            b.doc(what).injection(name, move |c, _, (): ()| match c.fail(name) {
-                true => Ok(()),
-                false => Err(Failure(format!("no fault `{name}`"))),
-            });
-        }
+        Self::offer_operations(b);
         let p = DriveParameters::default();
         Self {
             effort: b.doc("Torques, heard in mode 6.").unit("N m").input("joint_effort_command"),
@@ -296,6 +198,8 @@ impl Component for Driver {
             },
             drives: Drives::new(radians(PARK_POSE_DEG)),
             running: false,
+            arm_is_there: false,
+            waits_for_arm: None,
             motors: MotorStates::default(),
             bus: DriverState::default(),
             task: None,
@@ -323,6 +227,9 @@ impl Component for Driver {
         let effort = aged(&mut self.effort, cx);
         let twist = aged(&mut self.cmd_twist, cx).map(|(t, age)| (t.into(), age));
         let (plant, age) = aged(&mut self.plant_state, cx).unwrap_or((self.plant, f64::INFINITY));
+        if !self.arm_is_there && !self.finds_arm(age <= BUS_TIMEOUT, cx.dt()) {
+            return;
+        }
         self.plant = plant;
         self.unheard = self.again(age > BUS_TIMEOUT, self.unheard, cx.dt(), |c| _ = c.fail("ec_timeout"));
         let _ = self.gripper.take();
@@ -381,20 +288,6 @@ impl Component for Driver {
 }
 
 impl Driver {
-    /// Begins something that takes many updates; its ticket answers when it has ended.
-    fn begin(&mut self, cx: &mut Context, f: fn(&mut Drives) -> Result<(), &'static str>) -> OperationAnswer {
-        if !self.running {
-            return OperationAnswer::failed("the driver is not running");
-        }
-        match f(&mut self.drives) {
-            Ok(()) => {
-                self.task = Some(cx.ticket());
-                OperationAnswer::Pending
-            }
-            Err(why) => OperationAnswer::failed(why),
-        }
-    }
-
     /// Tells what is so, and tells it again as long as it lasts; since when it was told last, in s.
     fn again(&mut self, so: bool, told: Option<f64>, dt: f64, tell: impl FnOnce(&mut Self)) -> Option<f64> {
         let told = told.map(|since| since + dt).filter(|since| *since < AGAIN);
@@ -404,17 +297,6 @@ impl Driver {
                 0.0
             })
         })
-    }
-
-    /// A fault of that name happens; false: there is none.
-    fn fail(&mut self, wanted: &str) -> bool {
-        let Some(i) = FAULTS.iter().position(|(name, ..)| *name == wanted) else { return false };
-        self.motors.error_flags |= FAULTS[i].2;
-        self.bus.pd_recv_err += i64::from(wanted == "ec_timeout");
-        // How far a motion under way came nobody knows: it does not answer that it failed, but ends when it is given up.
-        self.drives.hold();
-        self.events.raise(self.names.faults[i]);
-        true
     }
 
     fn publish(&mut self, plant: &PlantState, driven: &DriveOutput, cx: &Context) {

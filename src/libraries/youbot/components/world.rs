@@ -4,7 +4,7 @@ use super::aged;
 use super::samples::{PlantCommand, PlantState, ToolPose, ToolTwist, stamp};
 use crate::libraries::youbot::parameters::PARK_POSE_DEG;
 use crate::libraries::youbot::rigid_body::{J5, radians};
-use crate::libraries::youbot::world::{FAR, PLANT_STEP, RobotBody, Surroundings};
+use crate::libraries::youbot::world::{Bar, FAR, PLANT_STEP, RobotBody, Surroundings};
 use crate::model::{EventName, Tunable};
 use crate::runtime::{Builder, Component, Context, EventOut, In, Out, Prop};
 use nalgebra::Vector3;
@@ -31,10 +31,13 @@ struct WorldRobot {
     torque_lag: Prop<f64>,
     table: Prop<f64>,
     wall: Prop<f64>,
+    place: Prop<f64>,
     body: RobotBody,
     /// Where its tool was when its windings were shorted, in m; none: they are not, or it has fallen and that was told.
     held_at: Option<f64>,
     braked: bool,
+    /// Whether there is such a robot: it was connected once since the world was configured.
+    is_there: bool,
 }
 
 impl WorldRobot {
@@ -49,7 +52,7 @@ impl WorldRobot {
             state: b.doc("Where it is, for its driver.").output(&named("state")),
             tool_pose: b.doc("Where its tool truly is.").output(&named("tool_pose")),
             tool_twist: b.doc("How its tool truly moves.").output(&named("tool_twist")),
-            contact: b.doc("What table and wall do to its tool, in the world.").unit("N").output(&named("contact")),
+            contact: b.doc("What table, wall and bar do to its tool, in the world.").unit("N").output(&named("contact")),
             q_start: b
                 .doc("Where its arm is when the simulation begins, rad from candle.")
                 .unit("rad")
@@ -80,9 +83,15 @@ impl WorldRobot {
                 .unit("m")
                 .range(-FAR..=FAR)
                 .property(&named("wall"), s.wall),
+            place: b
+                .doc("Where its frame begins on the world's x axis, along which the bar slides. All else is in its own frame.")
+                .unit("m")
+                .range(-FAR..=FAR)
+                .property(&named("place"), 0.0),
             body: RobotBody::new(radians(PARK_POSE_DEG), 1.0),
             held_at: None,
             braked: false,
+            is_there: false,
         }
     }
 
@@ -94,7 +103,8 @@ impl WorldRobot {
         let push = push.map(|(force, _)| force).unwrap_or_default();
         self.body.arm.friction_scale = self.friction_scale.get();
         self.body.torque_lag = self.torque_lag.get();
-        self.body.surroundings = Surroundings { table: self.table.get(), wall: self.wall.get(), ..surroundings };
+        let bar = surroundings.bar.map(|bar| Bar { at: bar.at - self.place.get(), ..bar });
+        self.body.surroundings = Surroundings { table: self.table.get(), wall: self.wall.get(), bar, ..surroundings };
         self.body.advance(&command.torque.into(), command.twist.into(), &push, command.braked, cx.dt());
         let height = self.body.tool().position.z;
         if std::mem::replace(&mut self.braked, command.braked) != command.braked {
@@ -115,6 +125,11 @@ impl WorldRobot {
 /// The component.
 pub struct YoubotWorld {
     places: [WorldRobot; 2],
+    bar: Option<Bar>,
+    bar_at: Prop<f64>,
+    bar_mass: Prop<f64>,
+    bar_damping: Prop<f64>,
+    bar_position: Out<f64>,
     events: EventOut,
     fell: EventName,
     stiffness: Prop<f64>,
@@ -124,16 +139,17 @@ pub struct YoubotWorld {
 impl Component for YoubotWorld {
     fn new(b: &mut Builder<Self>) -> Self {
         b.describe(&format!(
-            "The simulated world: arms and bases of one or two robots (rigid bodies, friction, stops, the base's lag), and a table and a \
-             wall that their tools touch. Steps of {} ms: give its activity that period. Drivers, hands and controllers see it through ports \
+            "The simulated world: arms and bases of one or two robots (rigid bodies, friction, stops, the base's lag), a table and a \
+             wall that their tools touch, and a bar that both push. Steps of {} ms: give its activity that period. Drivers, hands and controllers see it through ports \
              only; it goes on while drivers are stopped.",
             PLANT_STEP * 1e3
         ))
         .on_configure(|c, _| {
             for place in &mut c.places {
                 place.body = RobotBody::new(place.q_start.get(), place.mass_scale.get());
-                (place.held_at, place.braked) = (None, false);
+                (place.held_at, place.braked, place.is_there) = (None, false, false);
             }
+            c.put_bar();
             Ok(())
         })
         .on_start(|c, cx| {
@@ -144,17 +160,26 @@ impl Component for YoubotWorld {
         let s = Surroundings::default();
         Self {
             places: ["robot1", "robot2"].map(|robot| WorldRobot::declare(b, robot)),
+            bar: None,
+            bar_at: b
+                .doc("Where a bar across the x axis is put, which tools push along that axis; far away: there is none.")
+                .unit("m")
+                .range(-FAR..=FAR)
+                .property("bar", FAR),
+            bar_mass: b.doc("Of the bar.").unit("kg").range(0.2..=100.0).property("bar_mass", 1.0),
+            bar_damping: b.doc("Of the bar's rails.").unit("N s/m").range(0.0..=500.0).property("bar_damping", 2.0),
+            bar_position: b.doc("Where the bar is; written while there is one.").unit("m").output("bar_position"),
             events: b
                 .doc("e_arm_fell: an arm whose windings are shorted came down by more than 2 cm.")
                 .event_output("events"),
             fell: b.event("e_arm_fell"),
             stiffness: b
-                .doc("Of table and wall.")
+                .doc("Of table, wall and bar.")
                 .unit("N/m")
                 .range(0.0..=20_000.0)
                 .property("contact_stiffness", s.stiffness),
             damping: b
-                .doc("Of table and wall.")
+                .doc("Of table, wall and bar.")
                 .unit("N s/m")
                 .range(0.0..=500.0)
                 .property("contact_damping", s.damping),
@@ -163,15 +188,35 @@ impl Component for YoubotWorld {
 
     fn update(&mut self, cx: &mut Context) {
         let now = stamp(cx.now());
-        let surroundings =
-            Surroundings { stiffness: self.stiffness.get(), damping: self.damping.get(), ..Surroundings::default() };
+        if self.bar_at.changed() {
+            self.put_bar();
+        }
+        let (mass, damping) = (self.bar_mass.get(), self.bar_damping.get());
+        self.bar = self.bar.map(|bar| Bar { mass, damping, ..bar });
+        let (stiffness, damping) = (self.stiffness.get(), self.damping.get());
+        let surroundings = Surroundings { stiffness, damping, bar: self.bar, ..Surroundings::default() };
+        let mut on_bar = 0.0;
         for place in &mut self.places {
-            if place.state.is_connected() {
+            place.is_there |= place.state.is_connected();
+            if place.is_there {
                 if place.step(cx, surroundings) {
                     self.events.raise(self.fell);
                 }
+                on_bar += place.body.on_bar;
                 place.publish(now);
             }
         }
+        if let Some(bar) = &mut self.bar {
+            bar.step(on_bar, cx.dt());
+            self.bar_position.write(bar.at);
+        }
+    }
+}
+
+impl YoubotWorld {
+    /// The bar stands where it is put; far away there is none.
+    fn put_bar(&mut self) {
+        let (at, mass, damping) = (self.bar_at.get(), self.bar_mass.get(), self.bar_damping.get());
+        self.bar = (at.abs() < FAR).then_some(Bar { at, speed: 0.0, mass, damping });
     }
 }

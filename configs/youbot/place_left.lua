@@ -1,0 +1,2 @@
+robot = "left"
+return rfsm.load("place.lua")

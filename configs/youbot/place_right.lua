@@ -1,0 +1,2 @@
+robot = "right"
+return rfsm.load("place.lua")

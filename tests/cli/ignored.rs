@@ -1,0 +1,45 @@
+//! What a subsystem does not take, as its parent is told it where all are planned as one.
+
+use crate::hierarchy::{COORDINATOR, cell};
+use serde_json::json;
+
+/// A parent that asks for the end of what is down already is answered `.ignored`, in a plan as in a run; it is told to the state that asked.
+#[test]
+fn a_plan_tells_a_parent_what_its_subsystem_ignored() {
+    let asks_twice = COORDINATOR.replace(
+        r#"trans { src = "lowering", tgt = "idle", events = { "duo/down" } },"#,
+        r#"again = state { entry = "duo/e_shutdown" },
+  trans { src = "lowering", tgt = "again", events = { "duo/down" } },
+  trans { src = "again", tgt = "idle", events = { "duo/e_shutdown.ignored" } },"#,
+    );
+    let demo = cell();
+    demo.write("cell_coordinator.lua", &asks_twice);
+    let down = demo.run(&["plan", "cell.yaml", "--shutdown", "--json"]);
+    assert_eq!(down.code, 0, "{}{}", down.out, down.err);
+    assert_eq!(down.json().as_array().unwrap().last().unwrap()["result"]["components"], json!({}));
+    demo.write("story.lua", r#"deploy("cell.yaml") shutdown()"#);
+    let ran = demo.run(&["run", "story.lua", "--clock", "simulated"]);
+    assert_eq!(ran.code, 0, "{}{}", ran.out, ran.err);
+
+    // Who has left that state is not told, in neither.
+    demo.write(
+        "cell_coordinator.lua",
+        &asks_twice.replace(
+            r#"trans { src = "again", tgt = "idle", events = { "duo/e_shutdown.ignored" } },"#,
+            r#"later = state {},
+  trans { src = "again", tgt = "later", events = { "e_done" } },
+  trans { src = "later", tgt = "idle", events = { "duo/e_shutdown.ignored" } },"#,
+        ),
+    );
+    let down = demo.run(&["plan", "cell.yaml", "--shutdown"]);
+    assert!(down.code == 1 && down.err.contains("stops at `cell:root.later`"), "{}{}", down.out, down.err);
+
+    // What is taken is not answered.
+    let waits = COORDINATOR.replace(
+        r#"trans { src = "lowering", tgt = "idle", events = { "duo/down" } },"#,
+        r#"trans { src = "lowering", tgt = "idle", events = { "duo/e_shutdown.ignored" } },"#,
+    );
+    demo.write("cell_coordinator.lua", &waits);
+    let down = demo.run(&["plan", "cell.yaml", "--shutdown"]);
+    assert!(down.code == 1 && down.err.contains("stops at `cell:root.lowering`"), "{}{}", down.out, down.err);
+}

@@ -1,0 +1,27 @@
+//! A deployment that is a part of something larger, by itself.
+
+use crate::demo::{Demo, at_home};
+use serde_json::Value;
+
+/// A file that exports what its components cannot do without is a part: it is checked, planned and imitated, and refused where they would run.
+#[test]
+fn a_part_of_something_larger_is_not_deployed_alone() {
+    const PART: &str = "deployments/youbot_robot.yaml";
+    let checked = at_home(&["check", PART, "--json"]);
+    assert_eq!(checked.code, 0, "{}{}", checked.out, checked.err);
+    let findings = checked.json()["findings"].as_array().unwrap().clone();
+    let told: Vec<&Value> = findings.iter().filter(|finding| finding["code"] == "deploy::part").collect();
+    assert!(told.len() == 1 && told[0]["severity"] == "info", "{findings:#?}");
+    let whole = at_home(&["check", "deployments/youbot_coupling.yaml", "--json"]).json();
+    assert!(!whole["findings"].to_string().contains("deploy::part"), "it is where it belongs");
+
+    let demo = Demo::new();
+    let path = format!("{}/{PART}", env!("CARGO_MANIFEST_DIR"));
+    let refused = demo.run(&["deploy", &path, "--clock", "simulated"]);
+    assert!(refused.code == 1 && refused.err.contains("deploy::part"), "{}: {}", refused.code, refused.err);
+    demo.write("story.lua", &format!("deploy({path:?}) shutdown()"));
+    let refused = demo.run(&["run", "story.lua", "--clock", "simulated"]);
+    assert!(refused.code == 1 && refused.err.contains("part of something larger"), "{}: {}", refused.code, refused.err);
+    let imitated = demo.run(&["run", "story.lua", "--clock", "simulated", "--platform", "simulated"]);
+    assert_eq!(imitated.code, 0, "{}{}", imitated.out, imitated.err);
+}
