@@ -121,7 +121,10 @@ pub fn hash_system(system: &System, hasher: &mut impl Hasher) {
 /// Whether two systems are the same to an observer.
 pub fn same_system(a: &System, b: &System) -> bool {
     let mut same = a.len() == b.len();
-    a.for_each_component(&mut |node| same = same && b.component(node.name).is_some_and(|other| node.same(other)));
+    // What neither of them has changed since they were one is shared.
+    a.for_each_component(&mut |node| {
+        same = same && b.component(node.name).is_some_and(|other| std::ptr::eq(node, other) || node.same(other));
+    });
     let mut links = 0usize;
     a.for_each_link(&mut |from, to, policy| {
         links += 1;
