@@ -125,6 +125,7 @@ pub const READ: &[(&str, &[Code])] = &[
         "it is told as the reason why a request is refused, with the way to that",
         &[STACK_EMPTY, STACK_FULL, STACK_NO_FRAME],
     ),
+    ("it is told of the deployment's text: no way leads to it", &[DEPLOY_PART]),
     (
         "what is planned leads through all run states on its way: only a component that has failed meets it",
         &[ILLEGAL_TRANSITION, NOT_UNCONFIGURED],
