@@ -32,11 +32,6 @@ impl HandOver {
         self.slots.extend(slots);
     }
 
-    /// Whether nothing is handed over, and everything is sent.
-    pub(super) fn is_empty(&self) -> bool {
-        self.slots.is_empty() && self.takers.is_empty()
-    }
-
     /// What is taken over.
     pub(super) fn taken(&self) -> impl Iterator<Item = Slot> + '_ {
         self.takers.iter().map(|(_, slot, _)| *slot)

@@ -75,19 +75,14 @@ pub(super) fn fits(frames: &[Arc<Frame>], quota: Quota<'_>, memory: Option<&Memo
 pub(super) fn fit(frames: &mut Vec<Arc<Frame>>, quota: Quota<'_>, memory: Option<&Memory>) -> bool {
     while quota.own(frames).count() > quota.bound {
         let Some(Pair { lower, upper, way }) = pair(frames, quota) else { return false };
-        let left = match way {
-            Passage::Up(ref hand) if !hand.is_empty() => {
-                share::hand_over(frames, hand, &|id| id);
-                Some(overwritten(&frames[lower], &hand.slots))
+        let (made, stays, goes) = match (way, memory) {
+            (Passage::Up(left, hand), _) => {
+                share::hand_over(frames, &hand, &|id| id);
+                (Arc::new(squash(&left, &frames[upper])), upper, lower)
             }
-            Passage::Up(_) | Passage::Down => None,
+            (Passage::Down, Some(memory)) => (memory.squash(&frames[lower], &frames[upper]), lower, upper),
+            (Passage::Down, None) => (Arc::new(squash(&frames[lower], &frames[upper])), lower, upper),
         };
-        let made = match (&left, memory) {
-            (Some(left), _) => Arc::new(squash(left, &frames[upper])),
-            (None, Some(memory)) => memory.squash(&frames[lower], &frames[upper]),
-            (None, None) => Arc::new(squash(&frames[lower], &frames[upper])),
-        };
-        let (stays, goes) = if matches!(way, Passage::Down) { (lower, upper) } else { (upper, lower) };
         frames[stays] = made;
         frames.remove(goes);
     }
@@ -105,8 +100,9 @@ struct Pair {
 enum Passage {
     /// At the lower one's place: the upper one shares with nothing between.
     Down,
-    /// At the upper one's place: what lies between takes over what the lower one wrote, and the upper one wrote that again.
-    Up(HandOver),
+    /// At the upper one's place: what lies between takes over what the lower one wrote, and the upper one wrote that again. This is left
+    /// of the lower one.
+    Up(Box<Frame>, HandOver),
 }
 
 /// The two that are squashed next: the oldest, but such that as much as possible stays possible.
@@ -163,8 +159,13 @@ fn way(frames: &[Arc<Frame>], lower: usize, upper: usize, busy: &[FrameId]) -> O
         new.saved.iter().any(|saved| saved.slot == slot)
             && !old.footprint.touches.iter().any(|touch| touch.serves == Some(slot))
     };
-    let taken = hand.taken().all(again) && hand.slots.len() == hand.taken().count();
-    (taken && !hand.takers().any(|id| busy.contains(&id))).then_some(Passage::Up(hand))
+    if !hand.taken().all(again) || hand.takers().any(|id| busy.contains(&id)) {
+        return None;
+    }
+    let left = Box::new(overwritten(old, &hand.taken().collect()));
+    // Also what keeps nobody from undoing the lower one: above, it might keep that from being undone.
+    let clear = frames[lower + 1..upper].iter().all(|between| !share::shares(&left, between));
+    clear.then_some(Passage::Up(left, hand))
 }
 
 /// What is left of a frame whose absolute writes of these slots others have taken over.

@@ -146,3 +146,18 @@ fn a_frame_that_waits_for_its_confirmation_is_not_squashed() {
     let parts: Vec<usize> = bench.stack.frames().iter().map(|frame| frame.parts.len()).collect();
     assert_eq!(parts, [0, 2], "it stays by itself");
 }
+
+#[test]
+fn what_can_be_undone_beside_others_still_can() {
+    let mut bench = Bench::new(2);
+    let by = |name: &str| Requester::Coordinator(ComponentName::new(name).unwrap());
+    let of = |id: &str, operation: &str| conf(id, None, &[], vec![call(operation)], &[]);
+    bench.ok(&[at(&of("low", "A.open"), by("c"))]);
+    bench.ok(&[at(&of("mine", "B.open"), Requester::Operator)]);
+    // Of another file: no hindrance to `low`, which above it would be one to it.
+    let foreign = bench.ok(&[at(&of("s/mine", "A.open"), Requester::Operator)]).1[0];
+    bench.ok(&[at(&of("high", "B.open"), by("c"))]);
+    bench.ok(&[at(&of("high", "B.open"), by("c"))]);
+    assert_eq!(bench.stack.len(), 4);
+    bench.ok(&[Op::Undo(foreign)]);
+}
