@@ -33,6 +33,8 @@ fn a_plan_tells_a_parent_what_its_subsystem_ignored() {
     );
     let down = demo.run(&["plan", "cell.yaml", "--shutdown"]);
     assert!(down.code == 1 && down.err.contains("stops at `cell:root.later`"), "{}{}", down.out, down.err);
+    let ran = demo.run(&["run", "story.lua", "--clock", "simulated"]);
+    assert!(ran.code != 0 && ran.out.contains("cell:root.later"), "{}: {}{}", ran.code, ran.out, ran.err);
 
     // What is taken is not answered.
     let waits = COORDINATOR.replace(
