@@ -37,7 +37,8 @@ return state {
     trans { src = "initial",       tgt = "making" },
     trans { src = "making",        tgt = "raising", events = { "make.ok" }, effect = { "e_made", "left/e_start", "right/e_start" } },
     trans { src = "making",        tgt = "failed",  events = { "make.failed", "make.broken" } },
-    trans { src = "raising",       tgt = "failed",  events = { "left/failed", "right/failed" } },
+    trans { src = "raising",       tgt = "failed",
+            events = { "left/failed", "right/failed", "e_left_unplaced", "e_right_unplaced" } },
     trans { src = ".raising.both", tgt = "joined",  events = { "e_done" } },
   },
 

@@ -3,6 +3,7 @@
 local function of(word) return robot .. "/" .. word end
 local place = "place_" .. robot
 local close, out, gone = "e_" .. robot .. "_close", "e_" .. robot .. "_out", "e_" .. robot .. "_gone"
+local unplaced = "e_" .. robot .. "_unplaced"
 
 return state {
 
@@ -17,8 +18,8 @@ return state {
 
   placing  = state { entry = place },
   placed   = state {},
-  -- It could not be: a robot whose arm is not there tells so itself.
-  unplaced = state {},
+  -- It could not be. While all of it is brought up that has failed with it; a robot whose arm is not there stops by itself.
+  unplaced = state { entry = unplaced },
 
   lifting  = state { entry = place .. ".undo" },
   -- It could not be taken out: nothing is taken away under it. Who asks for the end once more has it tried again.

@@ -25,3 +25,23 @@ fn a_part_of_something_larger_is_not_deployed_alone() {
     let imitated = demo.run(&["run", "story.lua", "--clock", "simulated", "--platform", "simulated"]);
     assert_eq!(imitated.code, 0, "{}{}", imitated.out, imitated.err);
 }
+
+/// A robot that cannot be placed in the world of the coupling fails the bring-up at once, with the reason, and all of it is taken down.
+#[test]
+fn a_part_that_cannot_be_placed_fails_the_bring_up() {
+    let demo = Demo::new();
+    let path = format!("{}/deployments/youbot_coupling.yaml", env!("CARGO_MANIFEST_DIR"));
+    demo.write(
+        "story.lua",
+        &format!(
+            "fault('connect left/Link_Tx.tx', 'fail', 1)
+             local up, why = pcall(deploy, {path:?})
+             say('up: ' .. tostring(up) .. ' ' .. tostring(why) .. ' at ' .. now())"
+        ),
+    );
+    let ran = demo.run(&["run", "story.lua", "--clock", "simulated", "--platform", "simulated"]);
+    let said = ran.out.split_once("up: ").map(|(_, said)| said).unwrap_or_default();
+    assert!(said.starts_with("false") && said.contains("place_left.failed"), "{}: {}{}", ran.code, ran.out, ran.err);
+    let at: f64 = said.rsplit(" at ").next().and_then(|at| at.split_whitespace().next()?.parse().ok()).expect("when");
+    assert!(at < 5.0, "{at}");
+}
