@@ -277,14 +277,17 @@ fn a_log_is_that_of_a_subsystem_also_when_nobody_runs_any_more() {
 fn one_that_went_down_by_itself_is_seen_folded() {
     let cell = DeployedCell::new();
     assert_eq!(cell.0.run(&["event", "duo/left/Drive.faulted"]).code, 0);
-    // It leaves, and its parent with it: all of it is down again.
-    let down = until("it is down", || {
-        let shown = cell.shows(&["status", "--depth", "1"]);
-        shown.contains("duo/left down root.idle 0 frames 0 components\n").then_some(shown)
+    // It leaves, and its parent with it: one after the other all of it is down again, and the parent
+    // is told so only then.
+    let folded = until("all of it is down", || {
+        let shown = cell.shows(&["log", "--depth", "0"]);
+        shown.contains("event duo/down from duo\n").then_some(shown)
     });
-    assert!(down.contains("duo/right down root.idle 0 frames 0 components\n"), "{down}");
-    let folded = cell.shows(&["log", "--depth", "0"]);
-    assert!(folded.contains("event duo/down from duo\n"), "{folded}");
+    let down = cell.shows(&["status", "--depth", "1"]);
+    for which in ["left", "right"] {
+        let line = format!("duo/{which} down root.idle 0 frames 0 components\n");
+        assert!(down.contains(&line), "{down}\n{folded}");
+    }
 }
 
 #[test]
