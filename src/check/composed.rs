@@ -7,6 +7,7 @@
 use super::automaton::InterfaceAutomaton;
 use super::neighbours::{Neighbours, ParentInterface, accepted};
 use super::report::{Accepted, Explored, Report};
+use super::side_by_side;
 use super::simulated;
 use super::trace::{Does, TraceStep};
 use super::universe::Universe;
@@ -24,32 +25,30 @@ use std::sync::Arc;
 pub type CheckedFile = (Report, Option<Arc<InterfaceAutomaton>>);
 
 /// Checks a deployment, each of its files alone: `one` checks one. `around`: what is around all of it.
-pub fn run(
-    whole: Arc<Deployment>,
-    catalogue: &Catalogue,
-    around: &Neighbours,
-    one: &dyn Fn(Arc<Deployment>, &Catalogue, &Neighbours) -> CheckedFile,
-) -> CheckedFile {
+pub fn run<F>(whole: Arc<Deployment>, catalogue: &Catalogue, around: &Neighbours, one: &F) -> CheckedFile
+where
+    F: Fn(Arc<Deployment>, &Catalogue, &Neighbours) -> CheckedFile + Sync,
+{
     if whole.own.is_none() {
         return one(whole, catalogue, around);
     }
-    let mut reports: Vec<(Option<Ident>, Report)> = Vec::new();
-    let mut around = Neighbours { parent: around.parent.clone(), ..Neighbours::default() };
-    for subsystem in &whole.subsystems {
-        let alike = whole.subsystems.iter().find(|other| Arc::ptr_eq(&other.own, &subsystem.own));
-        if let Some(first) = alike.filter(|first| first.name != subsystem.name) {
-            if let Some(shows) = around.children.get(&first.name).cloned() {
-                around.children.insert(subsystem.name, shows);
-            }
-            continue;
-        }
+    let first_of = |own: &Arc<Deployment>| whole.subsystems.iter().find(|first| Arc::ptr_eq(&first.own, own));
+    let is_first = |subsystem: &&Subsystem| first_of(&subsystem.own).is_some_and(|first| first.name == subsystem.name);
+    let files: Vec<&Subsystem> = whole.subsystems.iter().filter(is_first).collect();
+    let checked = side_by_side::each(&files, |subsystem| {
         let local = catalogue.known_in(subsystem.name);
         let parent = Some(ParentInterface::of(whole.own_part(), subsystem));
-        let (report, shows) = run(subsystem.own.clone(), &local, &Neighbours { parent, ..Neighbours::default() }, one);
+        run(subsystem.own.clone(), &local, &Neighbours { parent, ..Neighbours::default() }, one)
+    });
+    let mut around = Neighbours { parent: around.parent.clone(), ..Neighbours::default() };
+    let mut reports: Vec<(Option<Ident>, Report)> = Vec::new();
+    for (file, (report, shows)) in files.into_iter().zip(checked) {
         // What is refused is not run: what it might tell is not worth following.
-        let shows = shows.filter(|_| report.verdict != CheckVerdict::Refused);
-        around.children.extend(shows.map(|shows| (subsystem.name, shows)));
-        reports.push((Some(subsystem.name), report));
+        if let Some(shows) = shows.filter(|_| report.verdict != CheckVerdict::Refused) {
+            let alike = whole.subsystems.iter().filter(|other| Arc::ptr_eq(&other.own, &file.own));
+            around.children.extend(alike.map(|other| (other.name, shows.clone())));
+        }
+        reports.push((Some(file.name), report));
     }
     let (mut view, types) = parents_view(whole.own_part(), catalogue);
     // Steps of subsystems may be meant, also of what these do not export.

@@ -2,7 +2,7 @@
 
 use crate::limits;
 
-/// How far following has come.
+/// How far following a file has come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Far {
     /// States that were met.
@@ -31,8 +31,9 @@ pub struct Effort<'e> {
     /// Coordinators that have nothing to do with each other are followed together all the same, and so are all files of a deployment with
     /// subsystems.
     pub together: bool,
-    /// Told every few thousand states how far it is; an error ends it there, and what was left out is said.
-    pub goes_on: &'e dyn Fn(Far) -> Result<(), Halt>,
+    /// Told every few thousand states how far it is; an error ends it there, and what was left out is said. Files of a deployment with subsystems
+    /// are followed side by side: each thread tells of its own.
+    pub goes_on: &'e (dyn Fn(Far) -> Result<(), Halt> + Sync),
 }
 
 impl Default for Effort<'_> {

@@ -79,6 +79,7 @@ mod shape;
 mod shared_list;
 mod shown;
 mod shows;
+mod side_by_side;
 mod simulated;
 mod standings;
 mod stands;

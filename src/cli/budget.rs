@@ -7,12 +7,13 @@ use crate::model::codes::CLI_MEMORY_UNKNOWN;
 use crate::model::finding::count;
 use crate::time::{Clock, Time};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use rustc_hash::FxHashMap;
 use signal_hook::SigId;
 use signal_hook::consts::SIGINT;
-use std::cell::Cell;
 use std::str::FromStr;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::ThreadId;
 use std::time::Duration;
 
 /// How much is followed.
@@ -117,7 +118,26 @@ pub struct Following {
     /// Ctrl-C came.
     interrupted: Arc<AtomicBool>,
     signals: Vec<SigId>,
-    told: Cell<Time>,
+    told: Mutex<ToldSoFar>,
+}
+
+/// What was told last, by those that follow side by side.
+struct ToldSoFar {
+    at: Time,
+    /// The states of the files that a thread has followed, and of the one that it follows.
+    states: FxHashMap<ThreadId, (usize, usize)>,
+}
+
+impl ToldSoFar {
+    /// How many states all have met, with what this thread tells of the file that it follows.
+    fn states(&mut self, of: usize) -> usize {
+        let (before, now) = self.states.entry(std::thread::current().id()).or_default();
+        if of < *now {
+            *before += *now;
+        }
+        *now = of;
+        self.states.values().map(|(before, now)| before + now).sum()
+    }
 }
 
 impl Following {
@@ -151,7 +171,7 @@ impl Following {
             bar,
             interrupted,
             signals: watched.unwrap_or_default(),
-            told: Cell::new(began),
+            told: Mutex::new(ToldSoFar { at: began, states: FxHashMap::default() }),
         })
     }
 
@@ -167,15 +187,20 @@ impl Following {
         if self.budget.memory.is_some_and(over) {
             return Err(Halt::Memory);
         }
+        if self.bar.is_hidden() {
+            return Ok(());
+        }
+        let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
+        let states = told.states(far.states);
         let now = self.clock.now();
         let spent = now.since(self.began);
-        if spent >= TELLS_AFTER && !self.bar.is_hidden() && now.since(self.told.get()) >= Duration::from_millis(100) {
-            self.told.set(now);
+        if spent >= TELLS_AFTER && now.since(told.at) >= Duration::from_millis(100) {
+            told.at = now;
             #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-            let rate = (far.states as f64 / spent.as_secs_f64()) as u64;
+            let rate = (states as f64 / spent.as_secs_f64()) as u64;
             self.bar.set_message(format!(
                 "following: {}, {} of {}; {rate} states/s; Ctrl-C tells what was found so far",
-                count(far.states, "state"),
+                count(states, "state"),
                 count(far.transitions, "transition"),
                 self.budget.told(),
             ));
@@ -200,6 +225,14 @@ impl Drop for Following {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_states_of_all_files_are_counted() {
+        let mut told = ToldSoFar { at: Clock::real().now(), states: FxHashMap::default() };
+        assert_eq!([4, 10, 3].map(|states| told.states(states)), [4, 10, 13], "another file begins anew");
+        let beside = std::thread::scope(|scope| scope.spawn(|| told.states(5)).join());
+        assert_eq!(beside.ok(), Some(18), "a thread tells of its own file");
+    }
 
     #[test]
     fn a_budget_is_written_as_it_is_read() {

@@ -1,0 +1,43 @@
+//! Files that have nothing to do with each other are followed side by side, on as many cores as there are.
+
+use std::panic::resume_unwind;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread::{Builder, available_parallelism, scope};
+
+/// What `of` says of each, in their order and as if one had come after the other. Who asks does its part, so that all is done though the
+/// operating system has no thread left.
+pub fn each<T: Sync, R: Send>(items: &[T], of: impl Fn(&T) -> R + Sync) -> Vec<R> {
+    let next = AtomicUsize::new(0);
+    let work = || {
+        let mut said = Vec::new();
+        loop {
+            let at = next.fetch_add(1, Ordering::Relaxed);
+            let Some(item) = items.get(at) else { return said };
+            said.push((at, of(item)));
+        }
+    };
+    let cores = available_parallelism().map_or(1, usize::from);
+    let mut all = scope(|scope| {
+        let thread = |_| Builder::new().name("davit-check".to_owned()).spawn_scoped(scope, work).ok();
+        let others: Vec<_> = (1..cores.min(items.len())).map_while(thread).collect();
+        let mut all = work();
+        for other in others {
+            all.extend(other.join().unwrap_or_else(|panicked| resume_unwind(panicked)));
+        }
+        all
+    });
+    all.sort_by_key(|(at, _)| *at);
+    all.into_iter().map(|(_, said)| said).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::each;
+
+    #[test]
+    fn what_is_said_comes_in_the_order_of_what_was_asked() {
+        let numbers: Vec<u32> = (0..50).collect();
+        assert_eq!(each(&numbers, |number| number * 2), numbers.iter().map(|number| number * 2).collect::<Vec<_>>());
+        assert!(each(&[] as &[u32], |number| *number).is_empty());
+    }
+}
