@@ -4,7 +4,7 @@ use super::tree::{Cx, Entry, Kind, Node};
 use super::yaml;
 use crate::diagnostics::Language;
 use crate::lang::tree::Reading;
-use crate::model::finding::did_you_mean;
+use crate::model::finding::{did_you_mean, nearest};
 use crate::model::{Finding, Ident, Origin, codes};
 
 /// A parameter.
@@ -21,14 +21,32 @@ pub struct Param {
     origin: Origin,
 }
 
+/// Whose parameters `--set` gives, where it is a deployment that is read.
+#[derive(Debug, Clone, Default)]
+pub struct SetPlace {
+    /// What stands before their names: `left.` for those of a subsystem.
+    pub within: String,
+    /// The subsystems whose parameters are given the same way.
+    pub subsystems: Vec<Ident>,
+}
+
 /// All parameters of one load.
 #[derive(Debug, Default)]
-pub struct Params(pub Vec<Param>);
+pub struct Params {
+    /// Each once.
+    pub all: Vec<Param>,
+    place: SetPlace,
+}
 
 impl Params {
     /// Takes the values of `with:`, then those of `--set`.
     pub fn new(cx: &mut Cx, with: Vec<Entry>, set: &[(String, String)]) -> Self {
-        let mut out = Self::default();
+        Self::of(cx, SetPlace::default(), with, set)
+    }
+
+    /// The same of a deployment's file.
+    pub fn of(cx: &mut Cx, place: SetPlace, with: Vec<Entry>, set: &[(String, String)]) -> Self {
+        let mut out = Self { place, ..Self::default() };
         for entry in with {
             if let Err(error) = Ident::new(&entry.key) {
                 let finding =
@@ -43,7 +61,7 @@ impl Params {
                 cx.report(finding.at(empty).labelled("nothing stands here").help(help));
             }
             let (name, value, origin) = (entry.key.into_owned(), entry.value, entry.origin);
-            out.0.push(Param { name, value, used: false, set: false, origin });
+            out.all.push(Param { name, value, used: false, set: false, origin });
         }
         for (path, text) in set {
             out.set(cx, path, text);
@@ -52,23 +70,29 @@ impl Params {
     }
 
     fn set(&mut self, cx: &mut Cx, path: &str, text: &str) {
-        let bad = |why: &str| bad(path, text, why);
+        let within = self.place.within.clone();
+        let bad = |why: &str| bad(&format!("{within}{path}"), text, why);
         let parts: Vec<&str> = path.split('.').collect();
         if let Some(error) = parts.iter().find_map(|part| Ident::new(part).err()) {
-            cx.refuse(bad(&error.to_string()));
+            let refused = bad(&error.to_string());
+            cx.refuse(match path.contains('/') {
+                true => refused
+                    .help(format!("a parameter of a subsystem is given as `--set {within}{}`", path.replace('/', "."))),
+                false => refused,
+            });
             return;
         }
-        let Some((value, whole)) = value_of(cx, path, text) else { return };
-        let at = self.0.iter().position(|p| p.name == parts[0]);
+        let Some((value, whole)) = value_of(cx, &within, path, text) else { return };
+        let at = self.all.iter().position(|p| p.name == parts[0]);
         let index = at.unwrap_or_else(|| {
             let value = Node::new(Kind::Map(Vec::new()), whole);
-            self.0.push(Param { name: parts[0].to_owned(), value, used: false, set: true, origin: whole });
-            self.0.len() - 1
+            self.all.push(Param { name: parts[0].to_owned(), value, used: false, set: true, origin: whole });
+            self.all.len() - 1
         });
-        let mut node = &mut self.0[index].value;
+        let mut node = &mut self.all[index].value;
         for part in &parts[1..] {
             let Kind::Map(entries) = &mut node.kind else {
-                cx.report(bad(&format!("`{path}` names a key inside a value that is no table")).at(whole));
+                cx.report(bad(&format!("`{within}{path}` names a key inside a value that is no table")).at(whole));
                 return;
             };
             let i = entries.iter().position(|e| e.key == *part).unwrap_or_else(|| {
@@ -83,11 +107,23 @@ impl Params {
 
     /// Reports parameters that no file has read: they are most likely misspelt.
     pub fn finish(self, cx: &mut Cx) {
-        let others: Vec<String> = self.0.iter().filter(|p| !p.set || p.used).map(|p| p.name.clone()).collect();
-        for param in self.0.iter().filter(|p| !p.used) {
-            let message = format!("no Lua file reads the parameter `{}`", param.name);
-            let known = others.iter().filter(|n| **n != param.name).map(String::as_str);
-            let help = did_you_mean(&param.name, "parameters", known);
+        let others: Vec<String> = self.all.iter().filter(|p| !p.set || p.used).map(|p| p.name.clone()).collect();
+        for param in self.all.iter().filter(|p| !p.used) {
+            let within = if param.set { self.place.within.as_str() } else { "" };
+            let message = format!("no Lua file reads the parameter `{within}{}`", param.name);
+            let mut known: Vec<&str> = others.iter().filter(|n| **n != param.name).map(String::as_str).collect();
+            // `--set left.gain=1` is of a subsystem; another name before the point may be meant for one.
+            let dotted = param.set && matches!(param.value.kind, Kind::Map(_));
+            let subsystems: Vec<&str> =
+                self.place.subsystems.iter().filter(|_| dotted).map(|name| name.as_str()).collect();
+            let help = match nearest(&param.name, subsystems.iter().copied()) {
+                Some(near) => format!("did you mean the subsystem `{near}`?"),
+                None => {
+                    let what = if subsystems.is_empty() { "parameters" } else { "parameters and subsystems" };
+                    known.extend(subsystems);
+                    did_you_mean(&param.name, what, known)
+                }
+            };
             let finding = if param.set {
                 Finding::error(codes::TEXT_UNKNOWN_PARAMETER, message)
             } else {
@@ -103,13 +139,13 @@ fn bad(path: &str, text: &str, why: &str) -> Finding {
         .help("write `--set name=value` or `--set table.key=value`; the value is read as YAML")
 }
 
-/// The value that the command line gives, and where that stands.
-pub fn value_of(cx: &mut Cx, path: &str, text: &str) -> Option<(Node, Origin)> {
-    let file = cx.sources.add_file(format!("--set {path}"), text, Language::Yaml);
+/// The value that the command line gives, and where that stands. `within` stands before the name there.
+pub fn value_of(cx: &mut Cx, within: &str, path: &str, text: &str) -> Option<(Node, Origin)> {
+    let file = cx.sources.add_file(format!("--set {within}{path}"), text, Language::Yaml);
     let whole = cx.sources.whole_file(file);
     let value = yaml::read(cx, Reading { file, whole })?;
     if empty(&value).is_some() {
-        cx.refuse(bad(path, text, "it has no value"));
+        cx.refuse(bad(&format!("{within}{path}"), text, "it has no value"));
         return None;
     }
     Some((value, whole))

@@ -127,7 +127,7 @@ fn open(
         return None;
     }
     let mut with = Vec::new();
-    for param in &params.0 {
+    for param in &params.all {
         with.push((param.name.clone(), json(&param.value)));
     }
     let mut program = Program { file, text, host, files: BTreeMap::new(), with, open: trust.open, beside: Vec::new() };
@@ -154,7 +154,7 @@ fn open(
         let id = cx.sources.add_file(shown.clone(), text.clone(), Language::Lua);
         ids.insert(shown.clone(), id);
     }
-    for param in &mut params.0 {
+    for param in &mut params.all {
         param.used |= print::program_texts(&program).any(|text| mentions(text, &param.name));
     }
     let reads = match outcome {

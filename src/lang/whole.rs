@@ -5,7 +5,7 @@ use super::files::Sources;
 use super::lower::deployment as deployment_file;
 use super::lower::interface::{self, SubsystemDraft};
 use super::lower::{beside, configuration, monitor};
-use super::params::{self, Params};
+use super::params::{self, Params, SetPlace};
 use super::texts::{LoadOptions, configuration_tree, coordinator, host_files, monitor_tree, open, stem, unique};
 use super::tree::{Cx, Entry, Kind, Node};
 use super::trusted::Trust;
@@ -22,6 +22,8 @@ use std::sync::Arc;
 struct GivenPart {
     /// Whose it is, for messages: `` `left` ``.
     of: String,
+    /// What stands before the names of its parameters on the command line: `left.`.
+    within: String,
     given: Vec<Entry>,
     at: Origin,
 }
@@ -43,7 +45,8 @@ pub fn deployment(cx: &mut Cx, from: &Sources, path: &Path, options: &LoadOption
     let known = FxHashMap::default();
     let mut reader =
         DeploymentReader { from, options, open: vec![(path.to_path_buf(), Origin::NONE)], instances: 0, known };
-    let part = GivenPart { of: "the command line".to_owned(), given: Vec::new(), at: Origin::NONE };
+    let part =
+        GivenPart { of: "the command line".to_owned(), within: String::new(), given: Vec::new(), at: Origin::NONE };
     reader.deployment(cx, path, part, &options.set)
 }
 
@@ -76,7 +79,7 @@ impl DeploymentReader<'_> {
         };
         let draft = deployment_file::draft(cx, node, &stem(path))?;
         let folder = path.parent().map_or_else(PathBuf::new, Path::to_path_buf);
-        let subsystems = self.subsystems(cx, &folder, draft.subsystems, set)?;
+        let subsystems = self.subsystems(cx, &folder, draft.subsystems, (&part.within, set))?;
         let inner = |path: &str| {
             let first = path.split_once('.').map(|(first, _)| first);
             subsystems.iter().any(|subsystem| first == Some(subsystem.name.as_str()))
@@ -86,7 +89,7 @@ impl DeploymentReader<'_> {
         for (path, text) in set.iter().filter(|(path, _)| !inner(path)) {
             if !declared.keys().any(|name| name.as_str() == path) {
                 others.push((path.clone(), text.clone()));
-            } else if let Some((value, origin)) = params::value_of(cx, path, text) {
+            } else if let Some((value, origin)) = params::value_of(cx, &part.within, path, text) {
                 given.retain(|entry| entry.key != path.as_str());
                 given.push(Entry { key: path.clone().into(), origin, value });
             }
@@ -102,7 +105,8 @@ impl DeploymentReader<'_> {
             }
             with.push(entry);
         }
-        let mut params = Params::new(cx, with, &others);
+        let names = subsystems.iter().map(|subsystem| subsystem.name).collect();
+        let mut params = Params::of(cx, SetPlace { within: part.within, subsystems: names }, with, &others);
         let mut configurations = Vec::new();
         for (file, named_at) in &draft.configurations {
             if let Some(node) = configuration_tree(cx, from, &folder.join(file), *named_at, &mut params) {
@@ -187,7 +191,7 @@ impl DeploymentReader<'_> {
         cx: &mut Cx,
         folder: &Path,
         drafts: Vec<SubsystemDraft>,
-        set: &[(String, String)],
+        (within, set): (&str, &[(String, String)]),
     ) -> Option<Vec<Subsystem>> {
         let wanted = drafts.len();
         let mut read = Vec::new();
@@ -222,8 +226,12 @@ impl DeploymentReader<'_> {
                 Some(known) => known.clone(),
                 None => {
                     self.open.push((path.clone(), draft.named_at));
-                    let part =
-                        GivenPart { of: format!("`{}`", draft.name), given: draft.parameters, at: draft.named_at };
+                    let part = GivenPart {
+                        of: format!("`{}`", draft.name),
+                        within: format!("{within}{}.", draft.name),
+                        given: draft.parameters,
+                        at: draft.named_at,
+                    };
                     let deployment = self.deployment(cx, &folder.join(&draft.file), part, &own).map(Arc::new);
                     self.open.pop();
                     self.known.insert(key, deployment.clone());

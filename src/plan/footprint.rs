@@ -3,6 +3,7 @@
 //! What one step touches is said in [`crate::system::touch`].
 
 use crate::model::{ComponentName, Value};
+use crate::system::touch::HeldName;
 pub use crate::system::{Access, Slot, Touch};
 use rustc_hash::{FxHashMap, FxHashSet};
 
@@ -40,6 +41,8 @@ pub struct Index {
     slots: FxHashMap<Slot, Access>,
     existence: FxHashSet<ComponentName>,
     components: FxHashSet<ComponentName>,
+    /// What components have for themselves, whichever they are.
+    held: FxHashSet<HeldName>,
 }
 
 impl Index {
@@ -53,10 +56,10 @@ impl Index {
             let (a, b) = touch.slot.components();
             index.components.insert(a);
             index.components.insert(b);
-            if let Slot::Component(c) = touch.slot
-                && touch.access != Access::Need
-            {
-                index.existence.insert(c);
+            match touch.slot {
+                Slot::Component(c) if touch.access != Access::Need => _ = index.existence.insert(c),
+                Slot::Held(_, name) => _ = index.held.insert(name),
+                _ => {}
             }
         }
         index
@@ -73,6 +76,9 @@ impl Index {
             && self.components.contains(&c)
         {
             return true;
+        }
+        if let Slot::Held(_, name) = touch.slot {
+            return self.held.contains(&name);
         }
         // Absolute writes never block each other: the saved value is handed over.
         !touch.slot.is_absolute() && self.slots.get(&touch.slot).is_some_and(|access| access.shares(touch.access))

@@ -40,8 +40,11 @@ fn types() -> Arc<Catalogue> {
         let operation = OperationType { moves: name == "close", ..OperationType::new(effect) };
         ty.operations.insert(ident(name), operation);
     }
+    let mut bus = ComponentType::new("t.Bus", "has the bus for itself");
+    bus.exclusive.push(Resource::parse("bus").unwrap());
     let mut catalogue = Catalogue::new();
     catalogue.insert(ty);
+    catalogue.insert(bus);
     Arc::new(catalogue)
 }
 
@@ -78,6 +81,15 @@ fn call(operation: &str) -> ChangeKind {
     ChangeKind::OperationCall { call: Call { operation: member(operation), args: vec![] }, undo: None }
 }
 
+fn create(name: &str, ty: &str) -> ChangeKind {
+    ChangeKind::Create {
+        component: ComponentName::new(name).unwrap(),
+        ty: TypeName::new(ty).unwrap(),
+        activity: None,
+        properties: BTreeMap::new(),
+    }
+}
+
 fn push(configuration: &Configuration) -> Op<'_> {
     Op::Push { configuration, requester: Requester::Operator, at: Time(0), scope: None }
 }
@@ -89,14 +101,8 @@ impl Bench {
     }
 
     fn up(mut self) -> Self {
-        let create = |name: &str| ChangeKind::Create {
-            component: ComponentName::new(name).unwrap(),
-            ty: TypeName::new("t.Arm").unwrap(),
-            activity: None,
-            properties: BTreeMap::new(),
-        };
         let running = [("A", Wanted::Running), ("B", Wanted::Running)];
-        let up = conf("up", None, &[], vec![create("A"), create("B")], &running);
+        let up = conf("up", None, &[], vec![create("A", "t.Arm"), create("B", "t.Arm")], &running);
         self.ok(&[push(&up)]);
         self.stack.make_permanent(Requester::Operator);
         self

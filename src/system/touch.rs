@@ -4,8 +4,10 @@
 
 use super::{View, exclusive};
 use crate::model::{Call, ComponentName, Effect, MemberRef, Policy, Step, Transition, Tunable};
+use rustc_hash::FxBuildHasher;
 use smallvec::{SmallVec, smallvec};
 use std::fmt;
+use std::hash::BuildHasher;
 
 /// A thing of a system that can be read and written by itself.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -24,13 +26,25 @@ pub enum Slot {
     Link(MemberRef, MemberRef),
     /// What an operation does.
     Operation(MemberRef),
+    /// A thing that a component has for itself, known by its name. Whoever holds one of the same name touches the same.
+    Held(ComponentName, HeldName),
+}
+
+/// What stands for the name of a thing that components have for themselves. Two names that have the same by chance count as one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct HeldName(u64);
+
+impl HeldName {
+    fn of(name: &str) -> Self {
+        Self(FxBuildHasher.hash_one(name))
+    }
 }
 
 impl Slot {
     /// The components it belongs to (a connection belongs to two).
     pub fn components(self) -> (ComponentName, ComponentName) {
         match self {
-            Self::Component(c) | Self::State(c) => (c, c),
+            Self::Component(c) | Self::State(c) | Self::Held(c, _) => (c, c),
             Self::Property(m) | Self::Port(m) | Self::Drive(m) | Self::Operation(m) => (m.component, m.component),
             Self::Link(from, to) => (from.component, to.component),
         }
@@ -52,6 +66,7 @@ impl fmt::Display for Slot {
             Self::Drive(m) => write!(f, "what drives `{m}`"),
             Self::Link(from, to) => write!(f, "the connection {from} -> {to}"),
             Self::Operation(m) => write!(f, "the operation `{m}`"),
+            Self::Held(c, _) => write!(f, "what `{c}` has for itself"),
         }
     }
 }
@@ -131,8 +146,8 @@ pub fn touch_each(step: &Step, undo: Option<&Call>, before: &impl View, each: &m
             if matches!(transition, Transition::Configure | Transition::Cleanup)
                 && let Some(node) = before.component(*component)
             {
-                let rivals = exclusive::rivals(node, before);
-                rivals.into_iter().for_each(|(other, ..)| each(Touch::new(Slot::State(other), Access::Need)));
+                let held = exclusive::names(node).map(|name| Slot::Held(*component, HeldName::of(&name)));
+                held.for_each(|slot| each(Touch::new(slot, Access::Write)));
             }
         }
         Step::Create { component, .. } | Step::Destroy { component } => {

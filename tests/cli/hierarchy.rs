@@ -319,6 +319,22 @@ fn what_is_no_subsystem_is_refused_everywhere_with_what_may_be_meant() {
 }
 
 #[test]
+fn what_is_set_of_a_subsystem_is_told_by_its_whole_name() {
+    let demo = cell();
+    assert_eq!(demo.run(&["check", "cell.yaml", "--set", "duo.left.gain=0.5"]).code, 0);
+    for (set, said, help) in [
+        ("duo.left.gian=1", "the parameter `duo.left.gian`", "did you mean `gain`?"),
+        ("dou.left.gain=1", "the parameter `dou`", "known parameters and subsystems: `duo`"),
+        ("duo.lfet.gain=1", "the parameter `duo.lfet`", "did you mean the subsystem `left`?"),
+        ("duo/left.gain=1", "`duo/left` is not a name", "given as `--set duo.left.gain`"),
+        ("duo.left.gain=", "`--set duo.left.gain=`: it has no value", "write `--set name=value`"),
+    ] {
+        let ran = demo.run(&["check", "cell.yaml", "--set", set]);
+        assert!(ran.code != 0 && ran.err.contains(said) && ran.err.contains(help), "{set}: {}", ran.err);
+    }
+}
+
+#[test]
 fn a_plan_is_grouped_folded_or_of_one_subsystem() {
     let demo = cell();
     let shows = |args: &[&str]| {

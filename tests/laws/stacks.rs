@@ -246,7 +246,7 @@ proptest! {
     /// same system.
     #[test]
     fn squash_between((types, genes) in world(4..14), whose in vec(any::<bool>(), 14), bound in 2usize..4, undone in vec(any::<prop::sample::Index>(), 8)) {
-        let catalogue = crate::piles::catalogue(&types);
+        let catalogue = generate::catalogue(&types, false);
         let (mut small, mut large) = (Both::new(catalogue.clone(), bound), Both::new(catalogue, 64));
         let mut pushed: Vec<(FrameId, Requester)> = Vec::new();
         for (n, (gene, asked)) in genes.iter().zip(whose).enumerate() {

@@ -229,7 +229,7 @@ pub fn undefined(lua: &Lua, shared: &SharedRecorder, table: &Table, prefix: &str
         };
         if prefix.is_empty() {
             let mut recorder = recorder.borrow_mut();
-            if let Some(param) = recorder.params.0.iter_mut().find(|p| p.name == name) {
+            if let Some(param) = recorder.params.all.iter_mut().find(|p| p.name == name) {
                 param.used = true;
                 let value = convert::to_lua(lua, &param.value)?;
                 table.raw_set(key, value.clone())?;
@@ -248,7 +248,7 @@ pub fn undefined(lua: &Lua, shared: &SharedRecorder, table: &Table, prefix: &str
         })?;
         known.sort();
         let mut recorder = recorder.borrow_mut();
-        known.extend(recorder.params.0.iter().map(|p| p.name.clone()).filter(|_| prefix.is_empty()));
+        known.extend(recorder.params.all.iter().map(|p| p.name.clone()).filter(|_| prefix.is_empty()));
         let origin = recorder.word_at(line, &name);
         let finding = match CLOSED.iter().find(|(closed, _)| *closed == full) {
             Some((_, why)) => Finding::error(codes::LUA_CLOSED, format!("`{full}` is not there: {why}"))

@@ -63,6 +63,25 @@ fn the_safe_frame_in_force_is_squashed_last() {
 }
 
 #[test]
+fn what_holds_a_thing_is_not_squashed_past_who_let_it_go() {
+    let mut bench = Bench::new(2);
+    let c = Requester::Coordinator(ComponentName::new("c").unwrap());
+    let has = |id: &str, of: &str| conf(id, None, &[], vec![create(of, "t.Bus")], &[(of, Wanted::Stopped)]);
+    let of = |id: &str| conf(id, None, &[], vec![set("A.gain", 1.0)], &[]);
+    bench.ok(&[at(&has("one", "X"), c)]);
+    let gone = ChangeKind::Destroy { component: ComponentName::new("X").unwrap() };
+    let free = bench.ok(&[at(&conf("free", None, &[], vec![gone], &[]), Requester::Operator)]).1[0];
+    bench.ok(&[at(&has("other", "Y"), c)]);
+    // The one that is undone would have to hold what `Y` holds.
+    assert_eq!(bench.codes(&[Op::Undo(free)]), ["stack::shared"]);
+    // `one` and `other` are not one at the place of `one`: neither could be undone then.
+    bench.ok(&[at(&of("third"), c)]);
+    assert!(bench.stack.len() == 3, "{:?}", bench.stack.frames());
+    bench.ok(&[Op::UndoTo(0)]);
+    assert!(bench.system.component(ComponentName::new("X").unwrap()).is_none());
+}
+
+#[test]
 fn what_others_set_between_does_not_keep_frames_apart() {
     let mut bench = Bench::new(3);
     let by = |name: &str| Requester::Coordinator(ComponentName::new(name).unwrap());
