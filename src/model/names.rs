@@ -177,10 +177,15 @@ impl Ident {
     }
 }
 
+/// What stands before the last `/`. Names are short: it is found byte by byte.
+fn prefix_of(name: &'static str) -> &'static str {
+    name.bytes().rposition(|byte| byte == b'/').map_or("", |at| &name[..at])
+}
+
 impl ComponentName {
     /// The subsystem's path before the last `/`, empty at the top.
     pub fn prefix(&self) -> &'static str {
-        self.as_str().rsplit_once('/').map_or("", |(prefix, _)| prefix)
+        prefix_of(self.as_str())
     }
 
     /// `self.member`
@@ -230,7 +235,7 @@ impl ConfigId {
 
     /// The subsystem's path before the last `/`, empty at the top.
     pub fn prefix(&self) -> &'static str {
-        self.as_str().rsplit_once('/').map_or("", |(prefix, _)| prefix)
+        prefix_of(self.as_str())
     }
 }
 
