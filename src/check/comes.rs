@@ -28,7 +28,8 @@ impl Worlds<'_> {
     /// The first requests of a batch, as the stack decides.
     pub fn group(&self, id: WorldId, requests: &[Request], concurrent: &ConcurrentWork) -> Option<Group> {
         let ConcurrentWork { held, joined, placed, alone } = concurrent;
-        let rules = Rules { held, joined: *joined, placed: *placed, alone: *alone, ..self.rules() };
+        let pushes = Some(self.pushes.of(self.system(id)));
+        let rules = Rules { held, joined: *joined, placed: *placed, alone: *alone, pushes, ..self.rules() };
         self.get(id).map(|world| take_up(world, requests, &rules))
     }
 

@@ -1,7 +1,7 @@
 //! When two systems, or two frames, are the same to whoever may ask for something.
 
 use crate::model::Value;
-use crate::stack::{Frame, FrameId, shares};
+use crate::stack::{Frame, FrameId, Inverse, components, shares};
 use crate::system::{System, View};
 use rustc_hash::{FxHashMap, FxHasher};
 use smallvec::SmallVec;
@@ -12,16 +12,26 @@ use std::sync::{Arc, Weak};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct FrameNumber(u32);
 
+impl FrameNumber {
+    /// As a place in a list.
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
 /// The frames that were met, by what they contain.
 #[derive(Default)]
 pub struct FrameBook {
     frames: Vec<Arc<Frame>>,
     index: FxHashMap<u64, SmallVec<[u32; 1]>>,
     shares: FxHashMap<(u32, u32), bool>,
+    meets: FxHashMap<(u32, u32), bool>,
     /// Those of which worlds are made, each once.
     kept: FxHashMap<(FrameNumber, FrameId), Arc<Frame>>,
     /// By address, which is not used again as long as it is known here. What a frame contains goes with the last world that has it.
     known: FxHashMap<usize, (FrameNumber, Weak<Frame>)>,
+    /// With so many of them, those that are gone are forgotten.
+    forgets_at: usize,
 }
 
 impl FrameBook {
@@ -43,14 +53,39 @@ impl FrameBook {
                 next
             }
         };
+        if self.known.len() >= self.forgets_at {
+            self.known.retain(|_, (_, frame)| frame.strong_count() > 0);
+            self.forgets_at = (2 * self.known.len()).max(1024);
+        }
         self.known.insert(address, (FrameNumber(number), Arc::downgrade(frame)));
         FrameNumber(number)
     }
 
-    /// The frame of that number that contains the same, as it was first kept.
+    /// The frame of that number that contains the same, as it was first kept. All that contain the same share it.
     pub fn keep(&mut self, frame: &Arc<Frame>) -> Arc<Frame> {
         let number = self.number(frame);
-        self.kept.entry((number, frame.id)).or_insert_with(|| frame.clone()).clone()
+        let Self { kept, frames, known, .. } = self;
+        let make = || {
+            let first = &frames[number.0 as usize];
+            if Arc::ptr_eq(first, frame) {
+                return frame.clone();
+            }
+            let made = Arc::new(Frame { id: frame.id, at: frame.at, ..(**first).clone() });
+            known.insert(Arc::as_ptr(&made) as usize, (number, Arc::downgrade(&made)));
+            made
+        };
+        kept.entry((number, frame.id)).or_insert_with(make).clone()
+    }
+
+    /// Whether a frame above another one may keep that from being undone, take over from it or keep what it has called: not where they
+    /// are about different components.
+    pub fn meet(&mut self, (a, x): (&Frame, FrameNumber), (above, y): (&Frame, FrameNumber)) -> bool {
+        let meets = || {
+            let over = || a.saved.iter().any(|own| above.saved.iter().any(|other| other.slot == own.slot));
+            let apart = || components(&a.footprint).is_disjoint(&components(&above.footprint));
+            above.safe || a.floor.is_some() || over() || !apart()
+        };
+        *self.meets.entry((x.0, y.0)).or_insert_with(meets)
     }
 
     /// Whether two frames share anything.
@@ -81,8 +116,18 @@ fn same_frame(a: &Frame, b: &Frame) -> bool {
         && (a.partial, a.safe, &a.floor) == (b.partial, b.safe, &b.floor)
         && a.parts == b.parts
         && a.saved == b.saved
-        && a.inverse == b.inverse
-        && a.footprint == b.footprint
+        && same_inverse(&a.inverse, &b.inverse)
+        && (Arc::ptr_eq(&a.footprint, &b.footprint) || a.footprint == b.footprint)
+}
+
+/// What is shared is the same without looking.
+fn same_inverse(a: &Inverse, b: &Inverse) -> bool {
+    let shared = match (a, b) {
+        (Inverse::Steps(a), Inverse::Steps(b)) => Arc::ptr_eq(a, b),
+        (Inverse::List(a), Inverse::List(b)) => Arc::ptr_eq(a, b),
+        _ => false,
+    };
+    shared || a == b
 }
 
 fn hash_value(value: &Value, hasher: &mut impl Hasher) {

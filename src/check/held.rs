@@ -11,21 +11,23 @@ use smallvec::SmallVec;
 impl Worlds<'_> {
     /// The frames that a batch under way pops or hands over to.
     pub fn held_by(&mut self, id: WorldId, asks: &PlainBatch, begun: &ConcurrentWork) -> Held {
-        let key = (id, asks.clone(), begun.clone());
-        if let Some(known) = self.helds.get(&key) {
-            return known.clone();
-        }
-        let group = self.group(id, asks, begun);
-        let planned = group.and_then(|group| group.planned);
-        let held: Held = planned.iter().flat_map(held).collect();
-        self.helds.insert(key, held.clone());
-        held
+        self.held_and_staying(id, asks, begun).0.clone()
     }
 
     /// The frames that undos of a batch under way are about and that stay, since these are refused.
-    pub fn staying(&self, id: WorldId, asks: &PlainBatch, begun: &ConcurrentWork) -> Held {
-        let group = self.group(id, asks, begun);
-        group.iter().flat_map(|group| &group.stay).map(|(_, frame)| *frame).collect()
+    pub fn staying(&mut self, id: WorldId, asks: &PlainBatch, begun: &ConcurrentWork) -> Held {
+        self.held_and_staying(id, asks, begun).1.clone()
+    }
+
+    fn held_and_staying(&mut self, id: WorldId, asks: &PlainBatch, begun: &ConcurrentWork) -> &(Held, Held) {
+        let key = (id, asks.clone(), begun.clone());
+        if !self.helds.contains_key(&key) {
+            let group = self.group(id, asks, begun).unwrap_or_default();
+            let stay = group.stay.iter().map(|(_, frame)| *frame).collect();
+            let of = (group.planned.iter().flat_map(held).collect(), stay);
+            self.helds.insert(key.clone(), of);
+        }
+        &self.helds[&key]
     }
 
     /// Whether these may be refused for want of room on the stack.
@@ -76,12 +78,12 @@ impl Worlds<'_> {
 
     /// The place of a frame that counts.
     pub fn place(&self, id: WorldId, frame: FrameId) -> Option<usize> {
-        self.ids(id).iter().position(|id| *id == frame)
+        self.ids(id).position(|id| id == frame)
     }
 
     /// The number of the frame that counts at that place.
     pub fn frame(&self, id: WorldId, place: u8) -> Option<FrameId> {
-        self.ids(id).get(usize::from(place)).copied()
+        self.ids(id).nth(usize::from(place))
     }
 
     /// Whether frames have been squashed somewhere, and which of them goes back to an order that was not followed everywhere.

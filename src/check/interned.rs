@@ -20,7 +20,7 @@ impl Worlds<'_> {
         }
         let ids: Box<[FrameId]> = shape.ids(&world.stack).collect();
         let place = |id: &FrameId| ids.iter().position(|other| other == id).and_then(|at| u8::try_from(at).ok());
-        let of_before = self.ids(from).iter().map(place).collect();
+        let of_before = self.ids(from).map(|id| place(&id)).collect();
         let of = |id: &FrameId| world.stack.frame(*id).map(|frame| frame.configuration);
         let pushed = pushed.iter().filter_map(|id| Some((of(id)?, place(id)?))).collect();
         let world = self.intern_shaped(world, system, &shape);
@@ -41,7 +41,7 @@ impl Worlds<'_> {
             Knowledge::Exact(exact) => {
                 exact.system == system
                     && (Rc::ptr_eq(&exact.shape, shape) || exact.shape.counted == shape.counted)
-                    && (!in_order || exact.ids.iter().copied().eq(shape.ids(&world.stack)))
+                    && (!in_order || exact.shape.ids(&exact.world.stack).eq(shape.ids(&world.stack)))
             }
             Knowledge::Top(_) => false,
         };
@@ -55,8 +55,7 @@ impl Worlds<'_> {
         let piled_up = world.stack.frames().iter().any(|frame| frame.is_squashed());
         let mut actuator = false;
         world.system.for_each_component(&mut |node| actuator |= node.ty.actuator);
-        let ids = shape.ids(&world.stack).collect();
-        let exact = Exact { world, system, safe, actuator, piled_up, shape: shape.clone(), ids };
+        let exact = Exact { world, system, safe, actuator, piled_up, shape: shape.clone() };
         self.worlds.push(Knowledge::Exact(Box::new(exact)));
         self.index.entry(hash).or_default().push(id);
         id

@@ -36,6 +36,7 @@ mod exports;
 mod failing;
 #[cfg(any(test, feature = "internals"))]
 mod follow;
+mod frame_orders;
 mod heard;
 mod held;
 mod ignored;

@@ -1,12 +1,15 @@
 //! Which frames of a stack count, and in what order: what makes two stacks one for whoever asks.
 
 use super::equivalence::{FrameBook, FrameNumber};
+use super::frame_orders::{Noted, Orders};
 use crate::limits;
 use crate::model::ConfigId;
 use crate::stack::{Frame, FrameId, Requester, Stack, calls, is_kept, staying};
 use crate::system::Slot;
 use rustc_hash::{FxHashMap, FxHashSet};
 use smallvec::SmallVec;
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
 use std::rc::Rc;
 use std::sync::Arc;
 
@@ -48,10 +51,35 @@ pub struct Shapes {
     frames: FrameBook,
     orders: Orders,
     beneath: FxHashMap<Beneath, u32>,
-    /// Of a frame (its content) among the frames that do not count, so many of which lie below it.
+    /// Of a frame (its content) among those frames that do not count and that it has to do with, so many of which lie below it.
     under: FxHashMap<(FrameNumber, SmallVec<[FrameNumber; 4]>, usize), u32>,
     /// Of stacks that were met, by what their frames contain.
-    known: FxHashMap<SmallVec<[FrameNumber; 8]>, Rc<StackShape>>,
+    known: FxHashMap<Box<[FrameNumber]>, Rc<StackShape>>,
+    /// Of frames that were met, by their numbers.
+    facts: Vec<Option<FrameFacts>>,
+    /// The configurations, in the order of their names.
+    names: Vec<ConfigId>,
+    /// They are all of one file.
+    one_file: bool,
+}
+
+/// What is always the same of frames that contain the same.
+#[derive(Debug, Clone, Copy)]
+struct FrameFacts {
+    noted: Noted,
+    /// It has called something that it takes back by itself.
+    calls: bool,
+    /// The place of its configuration among all, by their names.
+    rank: usize,
+}
+
+/// A frame of a stack that counts.
+#[derive(Clone, Copy)]
+struct CountedFrame<'s> {
+    frame: &'s Arc<Frame>,
+    place: usize,
+    rank: usize,
+    counted: Counted,
 }
 
 /// What of a stack counts: always the same for frames that contain the same.
@@ -74,120 +102,45 @@ impl StackShape {
     }
 }
 
-/// In which orders frames of one requester were met, by their configurations: the lower one first.
-#[derive(Default)]
-struct Orders {
-    /// Of frames that count.
-    met: ConfigPairs,
-    /// As which they were taken instead, since it makes no difference to who undoes them.
-    taken_as: ConfigPairs,
-    /// Of one that counts and one that does not: which lies lower is not looked at.
-    beside: ConfigPairs,
-}
-
-/// Pairs of configurations. What lies below a frame is noted at once, for each of thousands of stacks.
-#[derive(Default)]
-struct ConfigPairs {
-    numbers: FxHashMap<ConfigId, usize>,
-    /// Of each upper one, the lower ones by their numbers.
-    lower: Vec<ConfigBits>,
-}
-
-/// Configurations by their numbers, a bit each.
-#[derive(Default, Clone)]
-struct ConfigBits(SmallVec<[u64; 2]>);
-
-impl ConfigBits {
-    fn insert(&mut self, number: usize) {
-        if self.0.len() <= number / 64 {
-            self.0.resize(number / 64 + 1, 0);
-        }
-        self.0[number / 64] |= 1 << (number % 64);
-    }
-
-    fn extend(&mut self, more: &Self) {
-        if self.0.len() < more.0.len() {
-            self.0.resize(more.0.len(), 0);
-        }
-        self.0.iter_mut().zip(&more.0).for_each(|(own, more)| *own |= more);
-    }
-
-    fn contains(&self, number: usize) -> bool {
-        self.0.get(number / 64).is_some_and(|bits| bits & (1 << (number % 64)) != 0)
-    }
-}
-
-impl ConfigPairs {
-    fn number(&mut self, id: ConfigId) -> usize {
-        let next = self.numbers.len();
-        let number = *self.numbers.entry(id).or_insert(next);
-        if number == next {
-            self.lower.push(ConfigBits::default());
-        }
-        number
-    }
-
-    fn insert(&mut self, lower: ConfigId, upper: ConfigId) {
-        let (lower, upper) = (self.number(lower), self.number(upper));
-        self.lower[upper].insert(lower);
-    }
-
-    fn contains(&self, lower: ConfigId, upper: ConfigId) -> bool {
-        let (Some(lower), Some(upper)) = (self.numbers.get(&lower), self.numbers.get(&upper)) else { return false };
-        self.lower[*upper].contains(*lower)
-    }
-
-    fn iter(&self) -> impl Iterator<Item = (ConfigId, ConfigId)> + '_ {
-        let all = || self.numbers.iter();
-        let of = move |(id, number): (&ConfigId, &usize)| {
-            let (id, bits) = (*id, &self.lower[*number]);
-            all().filter(|(_, other)| bits.contains(**other)).map(move |(other, _)| (*other, id))
-        };
-        self.numbers.iter().flat_map(of)
-    }
-}
-
-impl Orders {
-    fn note(&mut self, frames: &[Arc<Frame>], counts: &[bool]) {
-        // Of each requester what lies below, that which counts and that which does not: numbers of `met` and of `beside`.
-        let mut below: SmallVec<[(Requester, ConfigBits, ConfigBits, ConfigBits); 2]> = SmallVec::new();
-        for (frame, counts) in frames.iter().zip(counts) {
-            let place = below.iter().position(|(by, ..)| *by == frame.requester).unwrap_or_else(|| {
-                below.push((frame.requester, ConfigBits::default(), ConfigBits::default(), ConfigBits::default()));
-                below.len() - 1
-            });
-            let (_, met, counted, uncounted) = &mut below[place];
-            let beside = self.beside.number(frame.configuration);
-            if *counts {
-                let number = self.met.number(frame.configuration);
-                self.met.lower[number].extend(met);
-                met.insert(number);
-                self.beside.lower[beside].extend(uncounted);
-                counted.insert(beside);
-            } else {
-                self.beside.lower[beside].extend(counted);
-                uncounted.insert(beside);
-            }
-        }
-    }
-}
-
 impl Shapes {
-    /// Shapes in which these frames count.
-    pub fn new(undone: Undone) -> Self {
-        Self { undone, ..Self::default() }
+    /// Shapes in which these frames count, of these configurations.
+    pub fn new(undone: Undone, configurations: impl Iterator<Item = ConfigId>) -> Self {
+        let mut names: Vec<ConfigId> = configurations.collect();
+        names.sort_unstable_by_key(ConfigId::as_str);
+        let one_file = names.iter().all(|name| name.prefix().is_empty());
+        Self { undone, names, one_file, ..Self::default() }
     }
 
     /// What of a stack counts.
     pub fn of(&mut self, stack: &Stack) -> Rc<StackShape> {
-        let numbers: SmallVec<[FrameNumber; 8]> =
+        let numbers: SmallVec<[FrameNumber; 64]> =
             stack.frames().iter().map(|frame| self.frames.number(frame)).collect();
-        if let Some(known) = self.known.get(&numbers) {
+        if let Some(known) = self.known.get(&numbers[..]) {
             return known.clone();
         }
-        let shape = Rc::new(self.work_out(stack));
-        self.known.insert(numbers, shape.clone());
+        let shape = Rc::new(self.work_out(stack, &numbers));
+        self.known.insert(numbers[..].into(), shape.clone());
         shape
+    }
+
+    /// What is to be known of a frame of that number.
+    fn facts(&mut self, frame: &Frame, number: FrameNumber) -> FrameFacts {
+        if let Some(known) = self.facts.get(number.index()).copied().flatten() {
+            return known;
+        }
+        let counts = self.undone.counts(frame);
+        let name = self.names.binary_search_by_key(&frame.configuration.as_str(), ConfigId::as_str);
+        let (met, beside) = self.orders.numbers(frame.configuration, counts);
+        let facts = FrameFacts {
+            noted: Noted { counts, met, beside },
+            calls: calls(frame).next().is_some(),
+            rank: name.unwrap_or_else(|at| at),
+        };
+        if self.facts.len() <= number.index() {
+            self.facts.resize(number.index() + 1, None);
+        }
+        self.facts[number.index()] = Some(facts);
+        facts
     }
 
     /// The stack is made of frames that are kept already where they are the same.
@@ -195,116 +148,150 @@ impl Shapes {
         stack.share(|frame| self.frames.keep(frame));
     }
 
-    fn work_out(&mut self, stack: &Stack) -> StackShape {
+    fn work_out(&mut self, stack: &Stack, numbers: &[FrameNumber]) -> StackShape {
         let frames = stack.frames();
-        let counts: Vec<bool> = frames.iter().map(|frame| self.undone.counts(frame)).collect();
-        self.orders.note(frames, &counts);
-        let mut kept: Vec<(&Arc<Frame>, Counted)> = Vec::new();
-        let others: SmallVec<[&Arc<Frame>; 4]> =
-            frames.iter().zip(&counts).filter(|(_, counts)| !**counts).map(|(frame, _)| frame).collect();
-        let numbers: SmallVec<[FrameNumber; 4]> = others.iter().map(|frame| self.frames.number(frame)).collect();
-        let mut below = 0;
-        for (i, frame) in frames.iter().enumerate() {
-            if !counts[i] {
-                below += 1;
-                continue;
+        let facts: SmallVec<[FrameFacts; 64]> =
+            frames.iter().zip(numbers).map(|(frame, number)| self.facts(frame, *number)).collect();
+        self.orders.note(frames.iter().zip(&facts).map(|(frame, facts)| (frame.requester, facts.noted)));
+        let others: SmallVec<[usize; 64]> = (0..frames.len()).filter(|at| !facts[*at].noted.counts).collect();
+        let mut kept: Vec<CountedFrame<'_>> = Vec::with_capacity(frames.len() - others.len());
+        for (place, frame) in frames.iter().enumerate().filter(|(place, _)| facts[*place].noted.counts) {
+            let (lower, upper) = others.split_at(place - kept.len());
+            // Those below matter only to what it has called, and only safe ones.
+            let lower = lower.iter().filter(|at| facts[place].calls && frames[**at].safe);
+            let mut lower: SmallVec<[usize; 4]> = lower.copied().collect();
+            let meets = |at: &&usize| self.frames.meet((frame, numbers[place]), (&frames[**at], numbers[**at]));
+            let mut upper: SmallVec<[usize; 4]> = upper.iter().filter(meets).copied().collect();
+            // Which comes first, and how often, matters only to who takes connections of other files away.
+            for list in [&mut lower, &mut upper].into_iter().filter(|_| self.one_file) {
+                list.sort_unstable_by_key(|at| numbers[*at]);
+                list.dedup_by_key(|at| numbers[*at]);
             }
-            let number = self.frames.number(frame);
-            // Those below matter only to what it has called.
-            let from = if calls(frame).next().is_some() { 0 } else { below };
-            let key = (number, SmallVec::from_slice(&numbers[from..]), below - from);
-            let under = match self.under.get(&key) {
-                Some(known) => *known,
-                None => {
-                    let next = u32::try_from(self.beneath.len()).unwrap_or(u32::MAX);
-                    let under = *self.beneath.entry(beneath(frame, &others[from..], below - from)).or_insert(next);
-                    self.under.insert(key, under);
-                    under
-                }
-            };
-            kept.push((frame, (number, under)));
+            let those = lower.iter().chain(&upper);
+            let key = (numbers[place], those.clone().map(|at| numbers[*at]).collect(), lower.len());
+            let under = self.under.get(&key).copied().unwrap_or_else(|| {
+                let next = u32::try_from(self.beneath.len()).unwrap_or(u32::MAX);
+                let those: Vec<Arc<Frame>> = those.map(|at| frames[*at].clone()).collect();
+                let under = *self.beneath.entry(beneath(frame, &those, lower.len())).or_insert(next);
+                self.under.insert(key, under);
+                under
+            });
+            kept.push(CountedFrame { frame, place, rank: facts[place].rank, counted: (numbers[place], under) });
         }
-        // Where it may come to squashing, the oldest go first. A stack that is not half full is far from that.
-        let of = |by: Requester| frames.iter().filter(|frame| frame.requester == by).count();
-        let filling =
-            |a: &Frame, b: &Frame| a.requester == b.requester && !stack.has_room(a.requester, of(a.requester));
-        let mut counted = Vec::with_capacity(kept.len());
-        let mut places = Vec::with_capacity(kept.len());
-        while !kept.is_empty() {
-            // Of those that could as well lie at the bottom, that with the least name.
-            let mut least = 0;
-            for at in 1..kept.len() {
-                let smaller = kept[at].0.configuration.as_str() < kept[least].0.configuration.as_str();
-                let mut passes =
-                    |below: usize| !filling(kept[below].0, kept[at].0) && self.commute(&kept[below], &kept[at]);
-                if smaller && (0..at).all(&mut passes) {
-                    least = at;
-                }
-            }
-            let (frame, one) = kept.remove(least);
-            for (below, _) in kept[..least].iter().filter(|(below, _)| below.requester == frame.requester) {
-                self.orders.taken_as.insert(frame.configuration, below.configuration);
-            }
-            counted.push(one);
-            let place = frames.iter().position(|other| Arc::ptr_eq(other, frame)).unwrap_or_default();
-            places.push(u16::try_from(place).unwrap_or(u16::MAX));
-        }
-        let [deep, left] = self.more_than([limits::CHECK_FRAMES, limits::CHECK_LEFT], stack);
-        StackShape { counted: counted.into(), places: places.into(), deep, left }
+        let order = self.canonical(stack, &kept);
+        let counted = order.iter().map(|at| kept[*at].counted).collect();
+        let places = order.iter().map(|at| u16::try_from(kept[*at].place).unwrap_or(u16::MAX)).collect();
+        let own = frames.iter().zip(&facts).filter(|(_, facts)| facts.noted.counts).map(|(frame, _)| frame);
+        let [deep, left] = more_than([limits::CHECK_FRAMES, limits::CHECK_LEFT], own);
+        StackShape { counted, places, deep, left }
     }
 
-    /// Of each of these bounds, a configuration of which one requester has more frames than that. Those of another one come of
-    /// other rounds.
-    fn more_than(&self, most: [usize; 2], stack: &Stack) -> [Option<ConfigId>; 2] {
-        let mut counts: SmallVec<[((ConfigId, Requester), usize); 16]> = SmallVec::new();
-        let mut deep = [None; 2];
-        for frame in stack.frames().iter().filter(|frame| self.undone.counts(frame) && !frame.is_squashed()) {
-            let key = (frame.configuration, frame.requester);
-            let count = match counts.iter_mut().find(|(of, _)| *of == key) {
-                Some((_, count)) => {
-                    *count += 1;
-                    *count
+    /// The order in which frames that count are taken: of those that could as well lie at the bottom, always that with the least name.
+    fn canonical(&mut self, stack: &Stack, kept: &[CountedFrame<'_>]) -> Vec<usize> {
+        if self.undone.in_order {
+            return (0..kept.len()).collect();
+        }
+        // Where it may come to squashing, the oldest go first. A stack that is not half full is far from that.
+        let mut known: SmallVec<[(Requester, bool); 4]> = SmallVec::new();
+        let mut filling = |by: Requester| {
+            let one = known.iter().find(|(of, _)| *of == by).copied().unwrap_or_else(|| {
+                let own = stack.frames().iter().filter(|frame| frame.requester == by).count();
+                let full = !stack.has_room(by, own);
+                known.push((by, full));
+                (by, full)
+            });
+            one.1
+        };
+        // Of each how many have to go first, and which it keeps waiting.
+        let mut waits: Vec<usize> = vec![0; kept.len()];
+        let mut behind: Vec<SmallVec<[usize; 2]>> = vec![SmallVec::new(); kept.len()];
+        for (at, below) in kept.iter().enumerate() {
+            let by = below.frame.requester;
+            let full = filling(by);
+            let mut in_row = !full;
+            for (other, above) in kept.iter().enumerate().skip(at + 1) {
+                let next = !in_row && above.frame.requester == by;
+                // Behind the next of a row is the rest of it.
+                let apart = above.frame.requester != by || !full;
+                if next || apart && !self.commute(below, above) {
+                    in_row |= next;
+                    waits[other] += 1;
+                    behind[at].push(other);
                 }
-                None => {
-                    counts.push((key, 1));
-                    1
-                }
-            };
-            for (deep, most) in deep.iter_mut().zip(most) {
-                *deep = deep.or((count > most).then_some(frame.configuration));
             }
         }
-        deep
+        let mut free: BinaryHeap<Reverse<(usize, usize)>> = BinaryHeap::new();
+        free.extend((0..kept.len()).filter(|at| waits[*at] == 0).map(|at| Reverse((kept[at].rank, at))));
+        let mut order = Vec::with_capacity(kept.len());
+        let (mut taken, mut lowest) = (vec![false; kept.len()], 0);
+        while let Some(Reverse((_, at))) = free.pop() {
+            let CountedFrame { frame, .. } = kept[at];
+            let passed = (lowest..at).filter(|below| !taken[*below]).map(|below| kept[below].frame);
+            for below in passed.filter(|below| below.requester == frame.requester) {
+                self.orders.take_as(frame.configuration, below.configuration);
+            }
+            taken[at] = true;
+            while taken.get(lowest) == Some(&true) {
+                lowest += 1;
+            }
+            order.push(at);
+            for other in &behind[at] {
+                waits[*other] -= 1;
+                if waits[*other] == 0 {
+                    free.push(Reverse((kept[*other].rank, *other)));
+                }
+            }
+        }
+        order
     }
 
     /// Whether stacks were taken for one in which frames of one requester lie in different orders. Which of them are squashed, and
     /// then are not undone by themselves any more, is known for one of these orders.
     pub fn mixes_orders(&self) -> bool {
-        let Orders { met, taken_as, beside } = &self.orders;
-        taken_as.iter().any(|(lower, upper)| met.contains(lower, upper))
-            || beside.iter().any(|(lower, upper)| lower != upper && beside.contains(upper, lower))
+        self.orders.mixed()
     }
 
     /// Whether it makes no difference which of two frames lies above the other: they share nothing, and are not undone by
     /// one name.
-    fn commute(&mut self, (a, one): &(&Arc<Frame>, Counted), (b, other): &(&Arc<Frame>, Counted)) -> bool {
-        if self.undone.in_order {
-            return false;
-        }
+    fn commute(&mut self, one: &CountedFrame<'_>, other: &CountedFrame<'_>) -> bool {
+        let (a, b) = (one.frame, other.frame);
         let one_name = a.requester == b.requester
             && (a.configuration == b.configuration || self.undone.bare.contains(&a.requester));
-        !one_name && !self.frames.share((a, one.0), (b, other.0))
+        !one_name && !self.frames.share((a, one.counted.0), (b, other.counted.0))
     }
 }
 
+/// Of each of these bounds, a configuration of which one requester has more frames than that. Those of another one come of
+/// other rounds.
+fn more_than<'f>(most: [usize; 2], frames: impl Iterator<Item = &'f Arc<Frame>>) -> [Option<ConfigId>; 2] {
+    let mut counts: SmallVec<[((ConfigId, Requester), usize); 16]> = SmallVec::new();
+    let mut deep = [None; 2];
+    for frame in frames.filter(|frame| !frame.is_squashed()) {
+        let key = (frame.configuration, frame.requester);
+        let count = match counts.iter_mut().find(|(of, _)| *of == key) {
+            Some((_, count)) => {
+                *count += 1;
+                *count
+            }
+            None => {
+                counts.push((key, 1));
+                1
+            }
+        };
+        for (deep, most) in deep.iter_mut().zip(most) {
+            *deep = deep.or((count > most).then_some(frame.configuration));
+        }
+    }
+    deep
+}
+
 /// What frames that do not count do to one that does, above so many of them.
-fn beneath(frame: &Arc<Frame>, others: &[&Arc<Frame>], below: usize) -> Beneath {
-    let others: Vec<Arc<Frame>> = others.iter().map(|frame| (*frame).clone()).collect();
+fn beneath(frame: &Arc<Frame>, others: &[Arc<Frame>], below: usize) -> Beneath {
     let above = &others[below..];
     let over = |slot: &Slot| above.iter().any(|f| f.saved.iter().any(|s| s.slot == *slot));
     let mut handed: Vec<Slot> = frame.saved.iter().map(|s| s.slot).filter(over).collect();
     if calls(frame).next().is_some() {
-        handed.extend(staying(frame, &others));
+        handed.extend(staying(frame, others));
     }
     handed.sort_unstable();
     handed.dedup();

@@ -15,7 +15,9 @@ use super::systems::{SystemId, Systems};
 use crate::model::{Ask, Catalogue, ConfigId, Configuration, Deployment, RequestId};
 use crate::plan::{PlanContext, Refusal, plan};
 use crate::stack::claims::Claims;
-use crate::stack::{BestEffort, FrameId, Reason, Request, Requester, Rules, SafeEnd, Stack, World, effort, take_up};
+use crate::stack::{
+    BestEffort, FrameId, PlannedPushes, Reason, Request, Requester, Rules, SafeEnd, Stack, World, effort, take_up,
+};
 use crate::system::{System, step};
 use crate::time::Time;
 use rustc_hash::{FxHashMap, FxHashSet, FxHasher};
@@ -52,8 +54,6 @@ pub(super) struct Exact {
     pub piled_up: bool,
     /// Those of its frames that count.
     pub shape: Rc<StackShape>,
-    /// Their numbers.
-    pub ids: Box<[FrameId]>,
 }
 
 /// All worlds that were met.
@@ -70,11 +70,14 @@ pub struct Worlds<'a> {
     pub(super) worlds: Vec<Knowledge>,
     pub(super) index: FxHashMap<u64, SmallVec<[WorldId; 1]>>,
     pub(super) systems: Systems,
+    /// What pushes come to in them.
+    pub(super) pushes: PlannedPushes,
     pub(super) comes: FxHashMap<(WorldId, PlainBatch, ConcurrentWork), Rc<Comes>>,
     safes: FxHashMap<(WorldId, Request, Held), Rc<SafeComes>>,
     /// How batches may end: many may so in many worlds.
     pub(super) ends: KeptValues<Vec<EndsSo>>,
-    pub(super) helds: FxHashMap<(WorldId, PlainBatch, ConcurrentWork), Held>,
+    /// Frames that batches under way pop or hand over to, and those that stay though their undo was asked for.
+    pub(super) helds: FxHashMap<(WorldId, PlainBatch, ConcurrentWork), (Held, Held)>,
     pub(super) withouts: FxHashMap<(WorldId, SmallVec<[Whose; 2]>), Option<Went>>,
     pub(super) asked: FxHashSet<ConfigId>,
     /// Configurations of which it can be told whether what they stand for is true.
@@ -95,11 +98,12 @@ impl<'a> Worlds<'a> {
             operator: deployment.operator_applies().collect(),
             claims: Claims::new(deployment.configurations.iter(), catalogue),
             context: context(deployment),
-            shapes: Shapes::new(undone),
+            shapes: Shapes::new(undone, deployment.configurations.iter().map(|c| c.id)),
             confirms: deployment.configurations.iter().any(|c| c.confirm.is_some()),
             worlds: Vec::new(),
             index: FxHashMap::default(),
             systems: Systems::default(),
+            pushes: PlannedPushes::default(),
             comes: FxHashMap::default(),
             safes: FxHashMap::default(),
             ends: KeptValues::default(),
@@ -146,11 +150,12 @@ impl<'a> Worlds<'a> {
     }
 
     /// The numbers of the frames that count, in their order.
-    pub(super) fn ids(&self, id: WorldId) -> &[FrameId] {
-        match &self.worlds[id as usize] {
-            Knowledge::Exact(exact) => &exact.ids,
-            Knowledge::Top(_) => &[],
-        }
+    pub(super) fn ids(&self, id: WorldId) -> impl Iterator<Item = FrameId> + '_ {
+        let exact = match &self.worlds[id as usize] {
+            Knowledge::Exact(exact) => Some(exact),
+            Knowledge::Top(_) => None,
+        };
+        exact.into_iter().flat_map(|exact| exact.shape.ids(&exact.world.stack))
     }
 
     /// What is known of a world that is not known.
@@ -207,6 +212,7 @@ impl<'a> Worlds<'a> {
             joined: false,
             placed: false,
             alone: None,
+            pushes: None,
         }
     }
 

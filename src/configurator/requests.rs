@@ -72,6 +72,7 @@ impl Engine {
                 joined: false,
                 placed: false,
                 alone,
+                pushes: None,
             };
             let mut group = take_up(&self.world, &requests, &rules);
             if let Some(at) = group.repairs

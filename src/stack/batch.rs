@@ -7,7 +7,9 @@
 
 use super::leave::along;
 use super::work::{Op, Planned, Room, Work};
-use super::{FrameId, LedDown, Pile, Reason, Request, Requester, Residual, Why, World, claims, may_commit, share};
+use super::{
+    FrameId, LedDown, Pile, PushesOf, Reason, Request, Requester, Residual, Why, World, claims, may_commit, share,
+};
 
 use crate::model::{Ask, ComponentName, ConfigId, Configuration, Finding, OnFailure, Step, Verdict, codes};
 use crate::plan::replace::neighbours;
@@ -39,6 +41,8 @@ pub struct Rules<'a> {
     pub placed: bool,
     /// It has begun alone, while this is led down: what operators have put in the way of its undos goes with these.
     pub alone: Option<LedDown>,
+    /// What is known of pushes in the system of the world; none: each is planned.
+    pub pushes: Option<PushesOf<'a>>,
 }
 
 /// A request of a batch that is answered.
@@ -91,7 +95,8 @@ pub fn take_up(world: &World, requests: &[Request], rules: &Rules<'_>) -> Group 
     let together = together(world, requests, rules.joined);
     let repairs = (together == 1).then(|| repairs(world, &requests[0])).flatten();
     let avoiding;
-    let context = if world.broken.is_empty() && world.quarantined.is_empty() {
+    let whole = world.broken.is_empty() && world.quarantined.is_empty();
+    let context = if whole {
         rules.context
     } else {
         avoiding = PlanContext { avoid: world.avoided(), ..rules.context.clone() };
@@ -101,7 +106,7 @@ pub fn take_up(world: &World, requests: &[Request], rules: &Rules<'_>) -> Group 
     'anew: loop {
         let mut group = Group { takes: together, told: refused.clone(), repairs, ..Group::default() };
         let mut view = Overlay::new(&world.system);
-        let mut work = Work::new(&mut view, &world.stack);
+        let mut work = Work::new(&mut view, &world.stack).knowing(rules.pushes.filter(|_| whole));
         for (place, request) in requests[..together].iter().enumerate() {
             if refused.iter().any(|told| told.place == place) {
                 continue;

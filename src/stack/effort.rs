@@ -48,7 +48,7 @@ pub fn effort(
 /// The frame of a safe configuration of which these steps were not done: it takes back what was.
 pub fn without(frame: Frame, missed: &[Step]) -> Frame {
     let (done, saved) = rest(&frame, &|planned| !missed.contains(&planned.step));
-    Frame { inverse: Inverse::List(items(&done, &saved)), saved, partial: true, ..frame }
+    Frame { inverse: Inverse::List(Arc::new(items(&done, &saved))), saved, partial: true, ..frame }
 }
 
 fn piecewise(

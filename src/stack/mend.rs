@@ -5,7 +5,8 @@
 //! stopped at once: it would move, and nobody asked for that. So both are one net, from what is there to what the undo
 //! leads to (semantics: *What goes wrong*).
 
-use super::work::{Op, Planned, is_bound, transaction};
+use super::net::is_bound;
+use super::work::{Op, Planned, transaction};
 use super::{Broken, Frame, FrameId, HandOver, SafeWrites, World, net};
 use crate::model::{ComponentName, MemberRef, Origin, RunState, Step};
 use crate::plan::footprint::{Footprint, Index, Saved, Slot};

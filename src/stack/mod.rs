@@ -6,7 +6,7 @@
 //! begins when by the [`Desk`]. The configurator carries out what these say, `check` follows what these say.
 //!
 //! * [`request`], [`answer`]: what is asked and answered. `work`: requests become one plan. `batch`: what the requests of a
-//!   batch come to. `settle`: what comes of them when they have ended. `effort`: what a safe configuration does. `leave`: what a coordinator that leads down takes along. `mend`: what is broken, brought back, in one net with the undo that asks for it. `desk`, [`claims`]: who waits for whom. `world`: system, stack and what is broken, as one. `prepared`: plans that are carried out again.
+//!   batch come to. `settle`: what comes of them when they have ended. `effort`: what a safe configuration does. `leave`: what a coordinator that leads down takes along. `mend`: what is broken, brought back, in one net with the undo that asks for it. `desk`, [`claims`]: who waits for whom. `world`: system, stack and what is broken, as one. `prepared`: plans that are carried out again. `pushes`: plans that are not made again.
 //! * `share`: what keeps a frame from being undone. `squash`: the bound. `stands`: when what a configuration stands for is watched no more. `net`: fewer steps to the same system.
 
 pub mod answer;
@@ -21,6 +21,7 @@ mod net;
 mod permanent;
 mod pile;
 mod prepared;
+mod pushes;
 pub mod request;
 mod settle;
 mod share;
@@ -40,6 +41,7 @@ pub use net::reduce;
 pub use permanent::may_commit;
 pub use pile::Pile;
 pub use prepared::{ResolvedStep, Switch};
+pub use pushes::{PlannedPushes, PushesOf};
 pub use request::{Batch, FrameId, LedDown, Request, Requester, Scope, Why};
 pub use settle::{About, Ending, Endings, SafeEnd, Settled, Stopped, settle};
 pub use share::{HandOver, calls, components, is_kept, shares, staying};
@@ -74,7 +76,7 @@ pub enum Inverse {
     /// By undoing its steps, last first. They are those of the plan that it came of.
     Steps(Arc<Vec<PlannedStep>>),
     /// By this list: several frames squashed into one, or what is left of one.
-    List(Vec<DraftStep>),
+    List(Arc<Vec<DraftStep>>),
 }
 
 /// An applied configuration.

@@ -3,11 +3,13 @@
 //! What this leaves out is argued step by step below; all the same, whoever uses the result on a live system simulates it
 //! and compares, and falls back to the whole list where they differ.
 
-use crate::model::{ComponentName, MemberRef, Step};
+use crate::model::{ComponentName, MemberRef, Step, Tunable};
 use crate::plan::footprint::Slot;
-use crate::plan::undo::{DraftStep, absolute};
-use crate::system::{View, is_so};
+use crate::plan::undo::{DraftStep, Script, absolute};
+use crate::plan::{PlannedStep, StepId};
+use crate::system::{Overlay, System, View, is_so};
 use rustc_hash::{FxHashMap, FxHashSet};
+use smallvec::SmallVec;
 
 /// The net of `items`. `present` is the system they begin in, where it is known; `bound` tells whether a property may be
 /// set only in certain run states.
@@ -17,6 +19,35 @@ pub fn reduce<V: View>(
     bound: &dyn Fn(MemberRef) -> bool,
 ) -> Vec<DraftStep> {
     cancel(drop_writes(items, present), bound)
+}
+
+/// Whether a property may be set only in certain run states: also that of a component that is neither now nor at the end
+/// there.
+pub(super) fn is_bound(property: MemberRef, now: &impl View, end: &impl View) -> bool {
+    let node = now.component(property.component).or_else(|| end.component(property.component));
+    let declared = node.and_then(|n| n.property(property.member));
+    declared.is_none_or(|(_, p)| p.tunable != Tunable::Always)
+}
+
+/// The net of `whole` with the places of its steps in it, when it ends in the same system (`end`) and is shorter.
+pub(super) fn shorter(
+    system: &System,
+    end: &Overlay<'_>,
+    whole: &[PlannedStep],
+) -> Option<(Vec<PlannedStep>, Vec<u32>)> {
+    let bound = |property: MemberRef| is_bound(property, system, end);
+    let reduced = reduce(whole.iter().map(DraftStep::of).collect(), Some(system), &bound);
+    if reduced.len() >= whole.len() {
+        return None;
+    }
+    let mut view = Overlay::new(system);
+    let mut script = Script::new(&mut view);
+    for item in reduced {
+        let after: SmallVec<[StepId; 1]> = script.steps.last().map(|s| s.id).into_iter().collect();
+        script.add(item, 0, &after).ok()?;
+    }
+    let net = script.finish_placed().ok()?;
+    view.same(end).then_some(net)
 }
 
 /// Absolute writes: only the last one to a slot counts, none to a component that is destroyed afterwards, and none of the

@@ -225,7 +225,8 @@ pub(super) fn hand_over(frames: &mut [Arc<Frame>], hand: &HandOver, real: &dyn F
             saved.value = value.clone();
             if let Inverse::List(items) = &mut frame.inverse
                 && let Some(step) = restoring(saved)
-                && let Some(item) = items.iter_mut().rev().find(|item| absolute(&item.step) == Some(*slot))
+                && let Some(item) =
+                    Arc::make_mut(items).iter_mut().rev().find(|item| absolute(&item.step) == Some(*slot))
             {
                 item.step = step;
             }

@@ -9,6 +9,7 @@ use crate::plan::footprint::{Footprint, Slot, Touch};
 use crate::plan::undo::{DraftStep, absolute, items};
 use crate::system::System;
 use rustc_hash::{FxHashMap, FxHashSet};
+use smallvec::SmallVec;
 use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -17,29 +18,72 @@ const REMEMBERED: usize = 4096;
 
 /// What was squashed of which two, for whoever follows thousands of stacks that have the same frames at the bottom.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Memory(Arc<Mutex<FxHashMap<[usize; 2], Remembered>>>);
+pub(super) struct Memory(Arc<Mutex<SquashedFrames>>);
+
+#[derive(Debug, Default)]
+struct SquashedFrames {
+    /// By their addresses.
+    same: FxHashMap<[usize; 2], Remembered>,
+    /// By the addresses of what they share with others that differ in their numbers alone.
+    alike: FxHashMap<[usize; 4], SmallVec<[Remembered; 1]>>,
+}
 
 #[derive(Debug)]
 struct Remembered {
     made: Arc<Frame>,
     /// They stay for as long as they are known by their addresses.
-    _of: [Arc<Frame>; 2],
+    of: [Arc<Frame>; 2],
 }
 
 impl Memory {
     fn squash(&self, lower: &Arc<Frame>, upper: &Arc<Frame>) -> Arc<Frame> {
         let key = [lower, upper].map(|frame| Arc::as_ptr(frame) as usize);
         let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(remembered) = known.get(&key) {
+        if let Some(remembered) = known.same.get(&key) {
             return remembered.made.clone();
         }
-        let made = Arc::new(squash(lower, upper));
-        if known.len() >= REMEMBERED {
-            known.clear();
+        let made = known.made_of(lower, upper);
+        if known.same.len() >= REMEMBERED {
+            known.same.clear();
         }
-        known.insert(key, Remembered { made: made.clone(), _of: [lower.clone(), upper.clone()] });
+        known.same.insert(key, Remembered { made: made.clone(), of: [lower.clone(), upper.clone()] });
         made
     }
+}
+
+impl SquashedFrames {
+    /// Two frames as one, worked out once for all that differ in their numbers alone.
+    fn made_of(&mut self, lower: &Arc<Frame>, upper: &Arc<Frame>) -> Arc<Frame> {
+        let ([a, b], [c, d]) = (shared(lower), shared(upper));
+        if self.alike.len() >= REMEMBERED {
+            self.alike.clear();
+        }
+        let alike = self.alike.entry([a, b, c, d]).or_default();
+        let fits = |Remembered { of: [a, b], .. }: &&Remembered| is_alike(a, lower) && is_alike(b, upper);
+        if let Some(Remembered { made, .. }) = alike.iter().find(fits) {
+            return Arc::new(Frame { id: upper.id, at: upper.at, ..(**made).clone() });
+        }
+        let made = Arc::new(squash(lower, upper));
+        alike.push(Remembered { made: made.clone(), of: [lower.clone(), upper.clone()] });
+        made
+    }
+}
+
+/// Where that stands which frames share that were copied of each other.
+fn shared(frame: &Frame) -> [usize; 2] {
+    let inverse = match &frame.inverse {
+        Inverse::Steps(steps) => Arc::as_ptr(steps) as usize,
+        Inverse::List(items) => Arc::as_ptr(items) as usize,
+    };
+    [inverse, Arc::as_ptr(&frame.footprint) as usize]
+}
+
+/// Whether two frames that share their inverse and footprint differ in nothing but number and age.
+fn is_alike(a: &Frame, b: &Frame) -> bool {
+    (a.configuration, a.group, a.requester, a.scope) == (b.configuration, b.group, b.requester, b.scope)
+        && (a.partial, a.safe, &a.floor) == (b.partial, b.safe, &b.floor)
+        && a.parts == b.parts
+        && a.saved == b.saved
 }
 
 /// Whose frames are squashed, and how far that may go.
@@ -174,14 +218,19 @@ fn overwritten(frame: &Frame, slots: &FxHashSet<Slot>) -> Frame {
     inverse.retain(|item| absolute(&item.step).is_none_or(|slot| !slots.contains(&slot)));
     let saved = frame.saved.iter().filter(|saved| !slots.contains(&saved.slot)).cloned().collect();
     let touches = frame.footprint.touches.iter().filter(|touch| !slots.contains(&touch.slot)).copied().collect();
-    Frame { inverse: Inverse::List(inverse), saved, footprint: Arc::new(Footprint { touches }), ..frame.clone() }
+    Frame {
+        inverse: Inverse::List(Arc::new(inverse)),
+        saved,
+        footprint: Arc::new(Footprint { touches }),
+        ..frame.clone()
+    }
 }
 
 /// The list that takes a frame back.
 pub(super) fn list(frame: &Frame) -> Vec<DraftStep> {
     match &frame.inverse {
         Inverse::Steps(steps) => items(steps, &frame.saved),
-        Inverse::List(list) => list.clone(),
+        Inverse::List(list) => list.to_vec(),
     }
 }
 
@@ -234,7 +283,7 @@ pub(super) fn squash(lower: &Frame, upper: &Frame) -> Frame {
         group: None,
         requester: upper.requester,
         at: upper.at,
-        inverse: Inverse::List(inverse),
+        inverse: Inverse::List(Arc::new(inverse)),
         footprint: Arc::new(Footprint { touches }),
         saved,
         floor,

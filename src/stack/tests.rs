@@ -8,6 +8,7 @@ use crate::time::Time;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+mod pushes;
 mod squash;
 mod void;
 
@@ -298,6 +299,7 @@ fn an_undo_by_leaving_a_state_that_is_refused_leaves_a_frame_like_others() {
         joined: false,
         placed: false,
         alone: None,
+        pushes: None,
     };
     let ask = Ask::UndoOf(ConfigId::new("low").unwrap());
     let undo = super::Request { scope, ..super::Request::new(RequestId(1), ask, Requester::Operator) };
@@ -331,6 +333,7 @@ fn an_undo_by_leaving_a_state_is_about_the_visit_that_was_left() {
         joined: false,
         placed: false,
         alone: None,
+        pushes: None,
     };
     let ask = Ask::UndoOf(ConfigId::new("mass").unwrap());
     let undo = super::Request { scope, ..super::Request::new(RequestId(1), ask, Requester::Operator) };

@@ -138,7 +138,13 @@ fn without(frame: &Frame, gone: &dyn Fn(ComponentName) -> bool) -> Frame {
         }
     };
     saved.retain(|saved| !either(saved.slot));
-    Frame { inverse: Inverse::List(inverse), footprint: Arc::new(Footprint { touches }), saved, floor, ..frame.clone() }
+    Frame {
+        inverse: Inverse::List(Arc::new(inverse)),
+        footprint: Arc::new(Footprint { touches }),
+        saved,
+        floor,
+        ..frame.clone()
+    }
 }
 
 /// The steps of a frame that count, and what they overwrote.

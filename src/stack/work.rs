@@ -1,14 +1,13 @@
 //! Operations on the stack become one plan: every step decided, and how the stack changes with each part of it.
 
+use super::pushes::PlannedPush;
 use super::share::{self, HandOver};
-use super::{Edits, Frame, FrameId, Inverse, Pile, Requester, Scope, Stack, net, newest, squash, void};
+use super::{Edits, Frame, FrameId, Inverse, Pile, PushesOf, Requester, Scope, Stack, net, newest, squash, void};
 use crate::model::finding::count;
-use crate::model::{
-    ComponentName, ConfigId, Configuration, Finding, Findings, MemberRef, OnFailure, Step, Tunable, codes,
-};
+use crate::model::{ComponentName, ConfigId, Configuration, Finding, Findings, MemberRef, OnFailure, Step, codes};
 use crate::plan::undo::{DraftStep, Script, undo};
-use crate::plan::{Plan, PlanContext, PlannedStep, Refusal, StepId, plan_on};
-use crate::system::{Overlay, System, View, Violation};
+use crate::plan::{PlanContext, PlannedStep, Refusal, StepId};
+use crate::system::{Overlay, System, View, Violation, step};
 use crate::time::Time;
 use rustc_hash::FxHashSet;
 use smallvec::SmallVec;
@@ -165,6 +164,10 @@ pub(super) struct Work<'o, 's, 'k> {
     parts: Vec<Part>,
     pushed: Vec<FrameId>,
     replaced: bool,
+    /// What is known of pushes in the system as it is.
+    known: Option<PushesOf<'k>>,
+    /// The view does not show yet what the lone steps do: they were known.
+    unseen: bool,
 }
 
 impl<'o, 's, 'k> Work<'o, 's, 'k> {
@@ -179,6 +182,8 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
             parts: Vec::new(),
             pushed: Vec::new(),
             replaced: false,
+            known: None,
+            unseen: false,
         }
     }
 
@@ -192,14 +197,28 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
         u32::try_from(steps).expect("fewer steps than that")
     }
 
+    /// The same, where something is known of pushes in the system as it is.
+    pub(super) fn knowing(self, known: Option<PushesOf<'k>>) -> Self {
+        Self { known, ..self }
+    }
+
+    /// Something follows: steps that stood alone are the first of the whole.
+    fn goes_on(&mut self) {
+        if let Some(lone) = self.lone.take() {
+            if std::mem::take(&mut self.unseen) {
+                let view = self.script.view_mut();
+                lone.iter().for_each(|planned| step::effect(&planned.step, view));
+            }
+            self.script.append(lone.iter().cloned());
+        }
+    }
+
     /// Adds an operation.
     ///
     /// # Errors
     /// [`Refusal`]; what is in the making is then of no further use.
     pub(super) fn add(&mut self, op: &Op<'_>, context: &PlanContext) -> Result<(), Refusal> {
-        if let Some(lone) = self.lone.take() {
-            self.script.append(lone.iter().cloned());
-        }
+        self.goes_on();
         let from = self.place();
         let mut edits = Edits::default();
         let (mut pushes, mut holds, mut on_failure, mut frame) = (None, false, OnFailure::default(), None);
@@ -242,9 +261,7 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
     /// # Errors
     /// As [`Self::add`].
     pub(super) fn add_undo(&mut self, id: FrameId, with: &[FrameId]) -> Result<(), Refusal> {
-        if let Some(lone) = self.lone.take() {
-            self.script.append(lone.iter().cloned());
-        }
+        self.goes_on();
         let from = self.place();
         let (mut edits, mut along) = (Edits::default(), Vec::with_capacity(with.len()));
         for other in with {
@@ -313,7 +330,7 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
             Inverse::Steps(steps) => undo(&mut self.script, steps, &frame.saved, &skip),
             Inverse::List(items) => {
                 let wave = self.script.next_wave();
-                for item in items {
+                for item in items.iter() {
                     if item.may_stay().is_some_and(skip) {
                         continue;
                     }
@@ -341,17 +358,24 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
         if let Some(group) = configuration.group {
             self.replace(group, configuration, requester, edits)?;
         }
-        let plan = plan_on(self.script.view_mut(), configuration, context)?;
-        let Plan { configuration: id, group, steps, footprint, saved, warnings, .. } = plan;
-        let floor = crate::plan::irreversible(&steps).map(str::to_owned);
-        self.warnings.extend(warnings);
+        let first = self.parts.is_empty() && !self.replaced && self.script.steps.is_empty();
+        let pushes = self.known.filter(|_| first);
+        let known = pushes.and_then(|pushes| pushes.known(configuration.id));
+        self.unseen = known.is_some();
+        let planned = known.unwrap_or_else(|| {
+            let planned = PlannedPush::on(self.script.view_mut(), configuration, context);
+            pushes.into_iter().for_each(|pushes| pushes.note(configuration.id, &planned));
+            planned
+        });
+        let PlannedPush { steps, footprint, saved, floor, warnings } =
+            planned.as_ref().as_ref().map_err(Refusal::clone)?;
+        self.warnings.extend(warnings.iter().cloned());
         let destroyed = steps.iter().filter_map(|planned| match planned.step {
             Step::Destroy { component } => Some(component),
             _ => None,
         });
         self.is_taken_away(destroyed, edits);
-        let steps = Arc::new(steps);
-        if self.parts.is_empty() && !self.replaced && self.script.steps.is_empty() {
+        if first {
             self.lone = Some(steps.clone());
         } else {
             self.script.append(steps.iter().cloned());
@@ -360,14 +384,14 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
         self.pushed.push(number);
         let frame = Arc::new(Frame {
             id: number,
-            configuration: id,
-            group,
+            configuration: configuration.id,
+            group: configuration.group,
             requester,
             at,
-            inverse: Inverse::Steps(steps),
-            footprint: Arc::new(footprint),
-            saved,
-            floor,
+            inverse: Inverse::Steps(steps.clone()),
+            footprint: footprint.clone(),
+            saved: saved.clone(),
+            floor: floor.clone(),
             parts: std::collections::BTreeSet::new(),
             scope,
             partial: false,
@@ -420,13 +444,13 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
     /// # Errors
     /// [`Refusal`] when the system is not as the frames say, or a push finds no room.
     pub(super) fn finish(self, system: &System, room: Option<Room<'_>>) -> Result<Planned, Refusal> {
-        let Self { mut script, lone, frames, warnings, popped, parts, pushed, stack, replaced } = self;
+        let Self { mut script, lone, frames, warnings, popped, parts, pushed, stack, replaced, .. } = self;
         script.settle_all().map_err(|found| drifted(&found))?;
         let undone = parts.iter().any(|part| part.pushes.is_none());
         let mixed = replaced || undone && parts.iter().any(|part| part.pushes.is_some());
         let end = mixed.then(|| script.view().clone());
         let whole = script.finish().map_err(|found| drifted(&found))?;
-        let net = end.and_then(|end| shorter(system, &end, &whole));
+        let net = end.and_then(|end| net::shorter(system, &end, &whole));
         let waiting = parts.iter().filter(|part| part.edits.waits).filter_map(|part| part.edits.push.as_ref());
         let held = room.iter().flat_map(|room| room.held).copied();
         let busy: Vec<FrameId> = held.chain(waiting.map(|frame| frame.id)).collect();
@@ -472,29 +496,4 @@ fn drifted(found: &[Violation]) -> Refusal {
         })
         .collect();
     Refusal { findings, request: 0 }
-}
-
-/// Whether a property may be set only in certain run states: also that of a component that is neither now nor at the end
-/// there.
-pub(super) fn is_bound(property: MemberRef, now: &impl View, end: &impl View) -> bool {
-    let node = now.component(property.component).or_else(|| end.component(property.component));
-    let declared = node.and_then(|n| n.property(property.member));
-    declared.is_none_or(|(_, p)| p.tunable != Tunable::Always)
-}
-
-/// The net of `whole` with the places of its steps in it, when it ends in the same system (`end`) and is shorter.
-fn shorter(system: &System, end: &Overlay<'_>, whole: &[PlannedStep]) -> Option<(Vec<PlannedStep>, Vec<u32>)> {
-    let bound = |property: MemberRef| is_bound(property, system, end);
-    let reduced = net::reduce(whole.iter().map(DraftStep::of).collect(), Some(system), &bound);
-    if reduced.len() >= whole.len() {
-        return None;
-    }
-    let mut view = Overlay::new(system);
-    let mut script = Script::new(&mut view);
-    for item in reduced {
-        let after: SmallVec<[StepId; 1]> = script.steps.last().map(|s| s.id).into_iter().collect();
-        script.add(item, 0, &after).ok()?;
-    }
-    let net = script.finish_placed().ok()?;
-    view.same(end).then_some(net)
 }

@@ -457,7 +457,7 @@ fn partial(frame: &Frame, items: Vec<DraftStep>, also: &FxHashSet<ComponentName>
         .copied()
         .collect();
     Frame {
-        inverse: Inverse::List(items),
+        inverse: Inverse::List(Arc::new(items)),
         footprint: Arc::new(Footprint { touches }),
         saved: frame.saved.iter().filter(|saved| slots.contains(&saved.slot)).cloned().collect(),
         floor,

@@ -180,3 +180,29 @@ fn what_can_be_undone_beside_others_still_can() {
     assert_eq!(bench.stack.len(), 4);
     bench.ok(&[Op::Undo(foreign)]);
 }
+
+/// Whoever follows thousands of stacks has what takes the same frames back once, whatever their numbers are.
+#[test]
+fn what_differs_in_numbers_alone_is_squashed_once() {
+    let mut bench = Bench::new(2);
+    bench.stack = Stack::remembering(2);
+    let of = |n: usize| conf(&format!("c{n}"), None, &[], vec![set("A.gain", n as f64)], &[]);
+    for n in 1..3 {
+        bench.ok(&[push(&of(n))]);
+    }
+    // The same frames with other numbers.
+    let mut other = bench.stack.clone();
+    let mut next = 100;
+    other.share(|frame| {
+        next += 1;
+        Arc::new(super::super::Frame { id: FrameId(next), ..(**frame).clone() })
+    });
+    let third = of(3);
+    let planned = bench.ask(&[push(&third)]).expect("it fits");
+    other.commit(planned);
+    bench.ok(&[push(&third)]);
+    let (a, b) = (&bench.stack.frames()[0], &other.frames()[0]);
+    assert!(a.is_squashed() && a.id != b.id && b.id == FrameId(102), "{:?} {:?}", a.id, b.id);
+    assert!(Arc::ptr_eq(&a.footprint, &b.footprint));
+    assert_eq!(super::super::Frame { id: a.id, ..(**b).clone() }, **a);
+}
