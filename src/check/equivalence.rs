@@ -78,12 +78,12 @@ impl FrameBook {
     }
 
     /// Whether a frame above another one may keep that from being undone, take over from it or keep what it has called: not where they
-    /// are about different components.
+    /// are about different components and want nothing of the same name for themselves.
     pub fn meet(&mut self, (a, x): (&Frame, FrameNumber), (above, y): (&Frame, FrameNumber)) -> bool {
         let meets = || {
             let over = || a.saved.iter().any(|own| above.saved.iter().any(|other| other.slot == own.slot));
             let apart = || components(&a.footprint).is_disjoint(&components(&above.footprint));
-            above.safe || a.floor.is_some() || over() || !apart()
+            above.safe || a.floor.is_some() || over() || !apart() || shares(a, above)
         };
         *self.meets.entry((x.0, y.0)).or_insert_with(meets)
     }
