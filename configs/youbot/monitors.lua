@@ -31,8 +31,11 @@ local degraded = all { settled, no(good) }
 
 local force = "Cart_Impedance.f_raw_norm"
 local heard = no(silent(force, 0.2))
+-- A driver that is dead goes on showing what it said last. Where that was that the drives take torques nobody knows what they do now; one
+-- that was stopped did not show it.
+local driver_lost = all { equals("youbot.control_mode", 6), silent("youbot.jointstate", DEAD) }
 -- Near counts where the drives take torques: a robot that is stopped is not about to couple.
-local near  = all { heard, below(force, 2.0), equals("youbot.control_mode", 6) }:for_at_least(0.3)
+local near  = all { heard, below(force, 2.0), equals("youbot.control_mode", 6), no(driver_lost) }:for_at_least(0.3)
 local peer  = "Link_Rx.peer_state"
 
 -- The fastest joint, in rad/s.
@@ -81,8 +84,9 @@ Monitors {
     when = above(max { "youbot.motor_states.temp[0]", "youbot.motor_states.temp[1]", "youbot.motor_states.temp[2]",
                        "youbot.motor_states.temp[3]", "youbot.motor_states.temp[4]" }, 80.0),
     event = "e_OVERTEMP", repeat_every = AGAIN },
-  bus_errors = monitor {
-    when = above(max { "youbot.driver_state.pd_send_err", "youbot.driver_state.pd_recv_err" }, 100),
+  bus_errors = monitor { description = "the bus has errors, or the driver, which writes in every update, is not heard",
+    when = any { above(max { "youbot.driver_state.pd_send_err", "youbot.driver_state.pd_recv_err" }, 100),
+                 driver_lost },
     event = "e_EC_TIMEOUT", repeat_every = AGAIN },
   controller_lost = monitor { description = "the impedance controller, which writes in every update, is not heard",
     when = silent("Cart_Impedance.active", DEAD),

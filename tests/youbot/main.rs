@@ -10,6 +10,7 @@ mod contact;
 mod counting;
 mod coupled;
 mod coupling;
+mod driver_dies;
 mod faults;
 mod files;
 #[path = "../support/flat.rs"]

@@ -1,12 +1,15 @@
 //! The youBot's drives as its driver sees them: control modes, limits, watchdogs, calibration, folding, braking.
 
 use super::base::Twist2;
-use super::handover::{Handover, ramped, slowed, within_speed};
+use super::handover::{Handover, ramped, within_speed};
 use super::parameters::{
     COULOMB, GRIPPER, JOINTS, PARK_POSE_DEG, RANGE_LOWER_DEG, RANGE_UPPER_DEG, TORQUE_LIMIT, WORKING_POSE_DEG,
 };
 use super::plant::joint_ranges;
 use super::rigid_body::{ArmModel, J5, radians};
+use task::DriveTask;
+
+mod task;
 
 /// What the drives do; numbers as in the KU Leuven driver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -57,7 +60,7 @@ pub enum DriveHappening {
     CalibrationFailed,
     /// A motion ended.
     Arrived,
-    /// A motion did not reach its end: something is in the way. The arm is held where it is.
+    /// A motion did not reach its end: something is in the way. The arm is held where it began, or where it cannot get on.
     MotionFailed,
 }
 
@@ -91,31 +94,11 @@ impl Default for DriveParameters {
 /// Gains of the position controllers, in N m/rad and N m s/rad.
 const POSITION_GAIN: [f64; JOINTS] = [400.0, 400.0, 200.0, 80.0, 30.0];
 const SPEED_GAIN: [f64; JOINTS] = [24.0, 24.0, 12.0, 4.0, 1.5];
-/// Peak joint speed of folding and unfolding, in rad/s.
-const MOTION_SPEED: f64 = 1.2;
-/// How close to its end a motion must come, in rad, and how much later than planned, in s.
-const ARRIVAL_ERROR: f64 = 0.03;
-const ARRIVAL_TIME: f64 = 3.0;
-/// Speed at which calibration looks for the stops, in rad/s.
-const CALIBRATION_SPEED: f64 = 0.3;
-/// A calibration that has not found the stops by then has failed, in s.
-const CALIBRATION_TIME: f64 = 9.0;
-/// Error of position that means a stop was met, in rad (with the gains above, 1 to 4 N m).
-const CONTACT_ERROR: f64 = 0.01;
-/// Joints that calibration moves against their stops, and which way. Joints 1 and 5 have index marks.
-const CALIBRATION_WAY: [f64; JOINTS] = [0.0, -1.0, 1.0, -1.0, 0.0];
 /// A step back inside the soft limit before its exit is reported, as a share of the range.
 const SOFT_LIMIT_HYSTERESIS: f64 = 0.01;
 
 /// As far from a stop an arm that sinks onto it is not dropped, in rad.
 const NEAR_STOP: f64 = 0.05;
-
-#[derive(Debug, Clone, Copy)]
-enum DriveTask {
-    Idle,
-    Moving { from: J5, to: J5, elapsed: f64, duration: f64 },
-    Calibrating { elapsed: f64, met: [bool; JOINTS] },
-}
 
 /// What the drives measure.
 #[derive(Debug, Clone, Copy, Default)]
@@ -288,7 +271,7 @@ impl Drives {
         self.hold();
         self.resumes = false;
         self.calibrated = false;
-        self.task = DriveTask::Calibrating { elapsed: 0.0, met: CALIBRATION_WAY.map(|way| way == 0.0) };
+        self.task = DriveTask::calibrating();
         Ok(())
     }
 
@@ -306,25 +289,6 @@ impl Drives {
     /// As [`Drives::unfold`].
     pub fn fold(&mut self) -> Result<(), &'static str> {
         self.go(radians(PARK_POSE_DEG))
-    }
-
-    fn go(&mut self, to: J5) -> Result<(), &'static str> {
-        if self.busy() {
-            return Err("a motion is under way");
-        }
-        if self.mode == DriveMode::Torque {
-            return Err("the drives take torques: set mode 1 first");
-        }
-        if !self.calibrated {
-            return Err("not calibrated");
-        }
-        self.hold();
-        self.resumes = false;
-        let from = self.measured.q;
-        // A quintic's peak speed is 15/8 of its mean.
-        let duration = ((to - from).amax() / MOTION_SPEED * 1.875).max(0.2);
-        self.task = DriveTask::Moving { from, to, elapsed: 0.0, duration };
-        Ok(())
     }
 
     /// One update of `dt` seconds: what is done until the next one. Commands come with their age in s.
@@ -374,63 +338,6 @@ impl Drives {
         // Windings are shorted when no torque is left.
         let braked = self.mode == DriveMode::MotorStop && self.torque == J5::zeros();
         DriveOutput { torque: self.torque, braked, twist: command }
-    }
-
-    fn advance_task(&mut self, dt: f64, report: &mut impl FnMut(DriveHappening)) {
-        match &mut self.task {
-            DriveTask::Idle => {
-                self.target_speed = slowed(&self.target_speed, dt);
-                self.target += self.target_speed * dt;
-            }
-            DriveTask::Moving { from, to, elapsed, duration } => {
-                *elapsed += dt;
-                let s = (*elapsed / *duration).min(1.0);
-                let way = s * s * s * (10.0 - 15.0 * s + 6.0 * s * s);
-                let speed = 30.0 * s * s * (1.0 - 2.0 * s + s * s) / *duration;
-                self.target = *from + (*to - *from) * way;
-                self.target_speed = (*to - *from) * speed;
-                let (to, over) = (*to, *elapsed - *duration);
-                if over >= 0.0 {
-                    self.target_speed = J5::zeros();
-                    // The motion has ended when the arm is there, not when it should be.
-                    if (self.measured.q - to).amax() < ARRIVAL_ERROR {
-                        self.task = DriveTask::Idle;
-                        report(DriveHappening::Arrived);
-                    } else if over > ARRIVAL_TIME {
-                        self.hold();
-                        report(DriveHappening::MotionFailed);
-                    }
-                }
-            }
-            DriveTask::Calibrating { elapsed, met } => {
-                *elapsed += dt;
-                for i in 0..JOINTS {
-                    if met[i] {
-                        continue;
-                    }
-                    self.target[i] += CALIBRATION_WAY[i] * CALIBRATION_SPEED * dt;
-                    // Behind its target and standing: something is in the way.
-                    let behind = (self.target[i] - self.measured.q[i]) * CALIBRATION_WAY[i];
-                    met[i] = behind > CONTACT_ERROR && self.measured.qd[i].abs() < 0.1 * CALIBRATION_SPEED;
-                }
-                if met.iter().all(|m| *m) {
-                    self.task = DriveTask::Idle;
-                    let found = (1..4).all(|i| self.is_at_stop(i));
-                    self.mode = if found { DriveMode::MotorStop } else { DriveMode::Positioning };
-                    self.handover.begin();
-                    self.calibrated = found;
-                    report(if found { DriveHappening::Calibrated } else { DriveHappening::CalibrationFailed });
-                } else if *elapsed > CALIBRATION_TIME {
-                    self.hold();
-                    report(DriveHappening::CalibrationFailed);
-                }
-            }
-        }
-    }
-
-    fn is_at_stop(&self, i: usize) -> bool {
-        let stop = if CALIBRATION_WAY[i] < 0.0 { RANGE_LOWER_DEG[i] } else { RANGE_UPPER_DEG[i] };
-        (self.measured.q[i] - stop.to_radians()).abs() < 0.02
     }
 
     fn position_control(&self) -> J5 {

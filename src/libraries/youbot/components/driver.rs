@@ -258,7 +258,8 @@ impl Component for Driver {
             DriveHappening::MotionFailed => {
                 events.raise(names.blocked);
                 if let Some(ticket) = task.take() {
-                    ticket.failed("the arm did not get there: something is in the way");
+                    ticket
+                        .failed("the arm did not get there: something is in the way; it went back as far as it could");
                 }
             }
             DriveHappening::CalibrationFailed => {

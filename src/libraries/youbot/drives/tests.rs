@@ -114,6 +114,25 @@ fn a_motion_that_is_held_up_fails_and_the_arm_stays() {
 }
 
 #[test]
+fn a_motion_that_meets_something_goes_back_before_it_fails() {
+    let mut drives = parked();
+    drives.calibrate().unwrap();
+    run(&mut drives, 3.0);
+    let start = drives.body.arm.q;
+    drives.unfold().unwrap();
+    run(&mut drives, 1.5);
+    let there = drives.body.arm.q;
+    assert!((there - start).amax() > 0.3, "it is well on its way");
+    // For a moment it cannot get on, and it is not pressed for longer than that takes to be noticed.
+    drives.body.arm.friction_scale = 1e6;
+    assert!(run(&mut drives, 0.5).is_empty(), "it has not failed yet");
+    drives.body.arm.friction_scale = 1.0;
+    assert_eq!(run(&mut drives, 4.0), [DriveHappening::MotionFailed]);
+    assert!((drives.body.arm.q - start).amax() < 0.03, "it is where it began: {}", drives.body.arm.q - start);
+    assert!(drives.mode() == DriveMode::Positioning && !drives.busy());
+}
+
+#[test]
 fn something_in_the_way_is_no_stop() {
     let mut drives = parked();
     drives.body.arm.q = radians([0.0, 0.0, 60.0, 0.0, 0.0]);
