@@ -1,6 +1,6 @@
 //! The scenarios of `examples/scenarios`, as `davit run` runs them in simulated time: each ends well, and within its bounds.
 
-use davit::app::script::{self, Interrupt, ScriptOptions};
+use davit::app::script::{self, Interrupt, ScriptEnd, ScriptOptions};
 use davit::lang::LoadOptions;
 use davit::libraries;
 use davit::time::Clock;
@@ -36,13 +36,13 @@ fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/scenarios")
 }
 
-fn run(name: &str) {
-    let (_, set) = SCENARIOS.iter().find(|(scenario, _)| *scenario == name).expect("listed");
+/// Runs a script on the simulated clock.
+pub fn script(file: &Path, set: &[(&str, &str)]) -> ScriptEnd {
     let mut load = LoadOptions::default();
     load.set.extend(set.iter().map(|(name, value)| ((*name).to_owned(), (*value).to_owned())));
     let clock = Clock::simulated();
     let end = script::run(
-        &folder().join(format!("{name}.lua")),
+        file,
         ScriptOptions {
             clock: clock.clone(),
             extensions: libraries::builtin().into(),
@@ -56,6 +56,12 @@ fn run(name: &str) {
     );
     clock.shutdown();
     assert!(end.failure.is_none(), "{:?}\n{:#?}", end.failure, end.figures);
+    end
+}
+
+fn run(name: &str) {
+    let (_, set) = SCENARIOS.iter().find(|(scenario, _)| *scenario == name).expect("listed");
+    let end = script(&folder().join(format!("{name}.lua")), set);
     assert!(!end.figures.is_empty(), "it measures something");
     let ended = end.ended.expect("it deployed something");
     assert!(ended.is_clean() && ended.forced.is_empty(), "{ended:?}");

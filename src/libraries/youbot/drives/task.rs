@@ -9,14 +9,15 @@ const MOTION_SPEED: f64 = 1.2;
 /// How close to its end a motion must come, in rad, and how much later than planned, in s.
 const ARRIVAL_ERROR: f64 = 0.03;
 const ARRIVAL_TIME: f64 = 3.0;
-/// An arm so far behind where it should be, in rad, for so long, in s, has met something: what moves freely is never a fifth of that behind.
+/// An arm so far behind where it should be, in rad, for so long, in s, has met something: all variants of the robot (`tests/youbot/variants.rs`) unfold
+/// without being taken for that.
 const BLOCKED_ERROR: f64 = 0.1;
 const BLOCKED_TIME: f64 = 0.2;
 /// Speed at which calibration looks for the stops, in rad/s.
 const CALIBRATION_SPEED: f64 = 0.3;
 /// A calibration that has not found the stops by then has failed, in s.
 const CALIBRATION_TIME: f64 = 9.0;
-/// Error of position that means a stop was met, in rad (with the gains above, 1 to 4 N m).
+/// Error of position that means a stop was met, in rad (with the gains of position control, 1 to 4 N m).
 const CONTACT_ERROR: f64 = 0.01;
 /// Joints that calibration moves against their stops, and which way. Joints 1 and 5 have index marks.
 const CALIBRATION_WAY: [f64; JOINTS] = [0.0, -1.0, 1.0, -1.0, 0.0];
