@@ -7,10 +7,10 @@ use std::thread::{Builder, available_parallelism, scope};
 /// What `of` says of each, in their order and as if one had come after the other. Who asks does its part, so that all is done though the
 /// operating system has no thread left.
 pub fn each<T: Sync, R: Send>(items: &[T], of: impl Fn(&T) -> R + Sync) -> Vec<R> {
-    on(available_parallelism().map_or(1, usize::from), items, of)
+    on_threads(available_parallelism().map_or(1, usize::from), items, of)
 }
 
-fn on<T: Sync, R: Send>(threads: usize, items: &[T], of: impl Fn(&T) -> R + Sync) -> Vec<R> {
+fn on_threads<T: Sync, R: Send>(threads: usize, items: &[T], of: impl Fn(&T) -> R + Sync) -> Vec<R> {
     let next = AtomicUsize::new(0);
     let work = || {
         let mut said = Vec::new();
@@ -35,7 +35,7 @@ fn on<T: Sync, R: Send>(threads: usize, items: &[T], of: impl Fn(&T) -> R + Sync
 
 #[cfg(test)]
 mod tests {
-    use super::on;
+    use super::*;
     use std::sync::{Mutex, mpsc};
     use std::time::Duration;
 
@@ -53,7 +53,7 @@ mod tests {
             number * 2
         };
         let numbers: Vec<u32> = (0..50).collect();
-        assert_eq!(on(2, &numbers, of), numbers.iter().map(|number| number * 2).collect::<Vec<_>>());
-        assert!(on(2, &[] as &[u32], |number| *number).is_empty());
+        assert_eq!(on_threads(2, &numbers, of), numbers.iter().map(|number| number * 2).collect::<Vec<_>>());
+        assert!(on_threads(2, &[] as &[u32], |number| *number).is_empty());
     }
 }
