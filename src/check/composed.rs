@@ -4,6 +4,7 @@
 //! parent is followed against their interface automata ([`derived`](super::derived)); of what they are made of there
 //! are the components that they export, which are there while that is promised ([`promises`](super::promises) holds both to it).
 
+use super::alike::is_alike;
 use super::automaton::InterfaceAutomaton;
 use super::neighbours::{Neighbours, ParentInterface, accepted};
 use super::report::{Accepted, Explored, Report};
@@ -32,23 +33,25 @@ where
     if whole.own.is_none() {
         return one(whole, catalogue, around);
     }
-    let first_of = |own: &Arc<Deployment>| whole.subsystems.iter().find(|first| Arc::ptr_eq(&first.own, own));
-    let is_first = |subsystem: &&Subsystem| first_of(&subsystem.own).is_some_and(|first| first.name == subsystem.name);
-    let files: Vec<&Subsystem> = whole.subsystems.iter().filter(is_first).collect();
-    let checked = side_by_side::each(&files, |subsystem| {
-        let local = catalogue.known_in(subsystem.name);
-        let parent = Some(ParentInterface::of(whole.own_part(), subsystem));
-        run(subsystem.own.clone(), &local, &Neighbours { parent, ..Neighbours::default() }, one)
+    let files = Instances::of(&whole, catalogue);
+    let checked = side_by_side::each(&files, |file| {
+        let local = catalogue.known_in(file.first.name);
+        let parent = Some(ParentInterface::of(whole.own_part(), file.all.iter().copied()));
+        run(
+            file.first.own.clone(),
+            &local,
+            &Neighbours { parent, stands_for: file.stands_for, ..Neighbours::default() },
+            one,
+        )
     });
     let mut around = Neighbours { parent: around.parent.clone(), ..Neighbours::default() };
-    let mut reports: Vec<(Option<Ident>, Report)> = Vec::new();
+    let mut reports: Vec<(Vec<Ident>, Report)> = Vec::new();
     for (file, (report, shows)) in files.into_iter().zip(checked) {
         // What is refused is not run: what it might tell is not worth following.
         if let Some(shows) = shows.filter(|_| report.verdict != CheckVerdict::Refused) {
-            let alike = whole.subsystems.iter().filter(|other| Arc::ptr_eq(&other.own, &file.own));
-            around.children.extend(alike.map(|other| (other.name, shows.clone())));
+            around.children.extend(file.all.iter().map(|other| (other.name, shows.clone())));
         }
-        reports.push((Some(file.name), report));
+        reports.push((file.names(), report));
     }
     let (mut view, types) = parents_view(whole.own_part(), catalogue);
     // Steps of subsystems may be meant, also of what these do not export.
@@ -63,8 +66,46 @@ where
         report.findings.push(finding);
         report.traces.push(Vec::new());
     }
-    reports.push((None, report));
+    reports.push((Vec::new(), report));
     (put_together(whole, reports), shows)
+}
+
+/// Subsystems of one file and the same parameters.
+struct Instances<'s> {
+    first: &'s Subsystem,
+    /// Of which what is followed here tells: these, and those that differ in values alone.
+    all: Vec<&'s Subsystem>,
+    /// What is followed of another one tells of it.
+    stands_for: bool,
+}
+
+impl<'s> Instances<'s> {
+    /// Of which what is said of the first is true, that one first.
+    fn names(&self) -> Vec<Ident> {
+        let others = self.all.iter().map(|subsystem| subsystem.name).filter(|name| *name != self.first.name);
+        std::iter::once(self.first.name).chain(others).collect()
+    }
+
+    fn of(whole: &'s Deployment, catalogue: &Catalogue) -> Vec<Self> {
+        let mut files: Vec<Self> = Vec::new();
+        for subsystem in &whole.subsystems {
+            let same = |file: &Self| Arc::ptr_eq(&file.first.own, &subsystem.own);
+            let local = catalogue.known_in(subsystem.name);
+            let follows =
+                |file: &Self| !file.stands_for && (same(file) || is_alike(&file.first.own, &subsystem.own, &local));
+            let known = files.iter().any(same);
+            let followed = files.iter_mut().find(|file| follows(file));
+            let stands_for = followed.is_some();
+            if let Some(file) = followed {
+                file.all.push(subsystem);
+            }
+            if !known {
+                let all = if stands_for { Vec::new() } else { vec![subsystem] };
+                files.push(Self { first: subsystem, all, stands_for });
+            }
+        }
+        files
+    }
 }
 
 /// A deployment as its own file has it, with what its subsystems export.
@@ -163,20 +204,22 @@ fn some_value(ty: &ValueType) -> Value {
 }
 
 /// One report of all.
-fn put_together(whole: Arc<Deployment>, reports: Vec<(Option<Ident>, Report)>) -> Report {
+fn put_together(whole: Arc<Deployment>, reports: Vec<(Vec<Ident>, Report)>) -> Report {
     let mut all: Vec<(Finding, Vec<TraceStep>)> = Vec::new();
     let mut explored = Explored { complete: true, without_failure: true, ..Explored::default() };
     let mut left: BTreeSet<String> = BTreeSet::new();
     let mut told: Vec<(Finding, Option<String>)> = Vec::new();
     let (mut followed, mut replayed, mut refused) = (true, true, false);
-    for (path, report) in reports {
+    for (names, report) in reports {
+        let path = names.first().copied();
         followed &= report.verdict != CheckVerdict::Refused || report.replayed.is_some();
         replayed &= report.replayed.is_some();
         refused |= report.verdict == CheckVerdict::Refused;
         explored = explored.and(report.explored);
-        left.extend(report.left.into_iter().map(|bound| match path {
-            Some(path) => format!("`{path}`: {bound}"),
-            None => bound,
+        let of: Vec<String> = names.iter().map(|name| format!("`{name}`")).collect();
+        left.extend(report.left.into_iter().map(|bound| match &of[..] {
+            [] => bound,
+            of => format!("{}: {bound}", of.join(", ")),
         }));
         let file = |path: &Option<Ident>| path.and_then(|path| Some(whole.subsystem(path.as_str())?.file.clone()));
         let own = file(&path);

@@ -4,6 +4,7 @@
 //! takes nothing else, so nothing runs that was not looked at.
 
 mod adjacency;
+mod alike;
 mod alone;
 mod arrive;
 mod aside;
@@ -103,6 +104,8 @@ mod ways;
 mod when;
 mod world;
 
+#[cfg(any(test, feature = "internals"))]
+pub use alike::is_alike;
 pub use drive::{Drive, Until, WayEvent, drive};
 pub use effort::{Effort, Far, Halt};
 #[cfg(any(test, feature = "internals"))]

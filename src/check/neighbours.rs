@@ -22,13 +22,15 @@ pub struct Neighbours {
     pub parent: Option<ParentInterface>,
     /// What its subsystems show, by their names. One that is not here may tell anything in any order.
     pub children: BTreeMap<Ident, Arc<InterfaceAutomaton>>,
+    /// Another file that is the same but for values is followed.
+    pub stands_for: bool,
 }
 
 impl ParentInterface {
-    /// What the coordinators of a file raise and hear of a subsystem, and of those that are of the same file: all are followed once.
-    pub fn of(own: &Deployment, subsystem: &Subsystem) -> Self {
+    /// What the coordinators of a file raise and hear of subsystems that are followed once.
+    pub fn of<'s>(own: &Deployment, subsystems: impl IntoIterator<Item = &'s Subsystem>) -> Self {
         let mut interface = Self::default();
-        for alike in own.subsystems.iter().filter(|other| Arc::ptr_eq(&other.own, &subsystem.own)) {
+        for alike in subsystems {
             let local = |event: EventName| EventName::new(event.local(alike.name)?).ok();
             for chart in own.charts() {
                 interface.hears.extend(chart.waited_for().into_iter().filter_map(local));

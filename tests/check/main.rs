@@ -8,6 +8,7 @@ mod demo;
 mod flat;
 
 mod advice;
+mod alike;
 mod apart;
 mod aside;
 mod asked;

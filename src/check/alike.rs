@@ -1,0 +1,116 @@
+//! Instances of one file that differ in values of properties alone: what follows from one of them follows from the other.
+//!
+//! What is followed asks of a property's value only whether it is the one that was there before. So two files are the same for it where
+//! everything but such values is, and where these are alike wherever they are alike in the other file. What is said of values themselves
+//! (types, limits, what a library reads in them) is no part of that, and is looked at in each.
+
+use crate::model::{Catalogue, ChangeKind, ComponentName, Deployment, Ident, MemberRef, TypeName, Value, ValueType};
+use crate::stack::contenders::may_hold;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Whether two files without subsystems are the same but for values.
+pub fn is_alike(one: &Deployment, other: &Deployment, catalogue: &Catalogue) -> bool {
+    if one.own.is_some() || other.own.is_some() || !holds_alike(one, other, catalogue) {
+        return false;
+    }
+    let Some(mut pairs) = Pairs::new(one, catalogue) else { return false };
+    let taken = defaults_taken(one, catalogue);
+    let mut renamed = other.clone();
+    for (configuration, by) in renamed.configurations.iter_mut().zip(&one.configurations) {
+        for (change, by) in configuration.changes.iter_mut().zip(&by.changes) {
+            let fits = match (&mut change.kind, &by.kind) {
+                (ChangeKind::PropertySet { property, value }, ChangeKind::PropertySet { property: of, value: by }) => {
+                    property == of && pairs.renames(*of, value, by)
+                }
+                (
+                    ChangeKind::Create { component, properties, .. },
+                    ChangeKind::Create { component: of, properties: by, .. },
+                ) => {
+                    let given = properties.iter_mut().zip(by);
+                    component == of
+                        && given.fold(true, |fits, ((name, value), (same, by))| {
+                            fits && name == same && pairs.renames(of.member(*name), value, by)
+                        })
+                }
+                _ => true,
+            };
+            if !fits {
+                return false;
+            }
+        }
+    }
+    // What nobody gives is the same in both; nothing of what is followed is about the name of a file's deployment.
+    let defaults = taken.into_iter().all(|(member, default)| pairs.are_one(member, &default, &default));
+    renamed.name = one.name;
+    defaults && renamed == *one
+}
+
+/// The values of one file by those of the other, property by property.
+struct Pairs {
+    /// What properties take: a whole number may be written for any number.
+    types: BTreeMap<MemberRef, ValueType>,
+    known: BTreeMap<MemberRef, Vec<(Value, Value)>>,
+}
+
+impl Pairs {
+    /// None: what a property takes depends on what its component is made as.
+    fn new(of: &Deployment, catalogue: &Catalogue) -> Option<Self> {
+        let mut types: BTreeMap<MemberRef, ValueType> = BTreeMap::new();
+        for (component, ty, _) in made(of) {
+            for (name, property) in catalogue.get(ty).into_iter().flat_map(|ty| &ty.properties) {
+                let known = types.entry(component.member(*name)).or_insert_with(|| property.ty.clone());
+                if *known != property.ty {
+                    return None;
+                }
+            }
+        }
+        Some(Self { types, known: BTreeMap::new() })
+    }
+
+    /// A value of the other file is called as in this one, if that is one to one.
+    fn renames(&mut self, property: MemberRef, other: &mut Value, one: &Value) -> bool {
+        let fits = self.are_one(property, other, one);
+        other.clone_from(one);
+        fits
+    }
+
+    fn are_one(&mut self, property: MemberRef, other: &Value, one: &Value) -> bool {
+        // What does not fit is refused, and nothing follows.
+        let fit = |value: &Value| self.types.get(&property).and_then(|ty| value.clone().fit(ty).ok());
+        let (Some(other), Some(one)) = (fit(other), fit(one)) else { return other == one };
+        let known = self.known.entry(property).or_default();
+        match known.iter().find(|(of, by)| *of == other || *by == one) {
+            Some((of, by)) => *of == other && *by == one,
+            None => {
+                known.push((other, one));
+                true
+            }
+        }
+    }
+}
+
+/// What a file makes, as what and with which values.
+fn made(of: &Deployment) -> impl Iterator<Item = (ComponentName, TypeName, &BTreeMap<Ident, Value>)> {
+    of.configurations.iter().flat_map(|configuration| &configuration.changes).filter_map(|change| change.kind.makes())
+}
+
+/// The defaults that properties take since who creates their component does not give them.
+fn defaults_taken(of: &Deployment, catalogue: &Catalogue) -> Vec<(MemberRef, Value)> {
+    let taken = made(of).filter_map(|(component, ty, given)| {
+        let properties = catalogue.get(ty)?.properties.iter().filter(|(name, _)| !given.contains_key(*name));
+        Some(properties.filter_map(move |(name, of)| Some((component.member(*name), of.default.clone()?))))
+    });
+    taken.flatten().collect()
+}
+
+/// Whether what components have for themselves keeps the same ones apart: it is the same, or nobody's twice.
+fn holds_alike(one: &Deployment, other: &Deployment, catalogue: &Catalogue) -> bool {
+    let held = |of: &Deployment| may_hold(of.configurations.iter(), catalogue);
+    let (one, other) = (held(one), held(other));
+    let alone = |of: &BTreeMap<ComponentName, BTreeSet<String>>| {
+        let mut names: Vec<&String> = of.values().flatten().collect();
+        names.sort();
+        names.windows(2).all(|two| two[0] != two[1])
+    };
+    one == other || one.keys().eq(other.keys()) && alone(&one) && alone(&other)
+}

@@ -1,0 +1,124 @@
+//! Files that differ in values of properties alone: what follows from one of them follows from the other, so it is followed once.
+
+use super::composed::{catalogue, files, load};
+use davit::check::{self, is_alike};
+use davit::lang::Sources;
+use davit::model::{Deployment, Severity};
+
+#[test]
+fn instances_that_differ_in_values_alone_are_followed_once() {
+    let followed = |left: &str, right: &str| {
+        let text = format!(
+            "left: {{ deployment: arm.yaml, parameters: {{ gain: {left} }} }}\n  right: {{ deployment: arm.yaml, parameters: {{ gain: {right} }} }}"
+        );
+        let before = "left: { deployment: arm.yaml, parameters: { gain: 0.7 } }\n  right: { deployment: arm.yaml }";
+        let whole = load(&files(&[("pair.yaml", before, &text)]), "pair.yaml", &[]).deployment.unwrap();
+        let report = check::run(whole.clone(), &catalogue(&whole));
+        let found: Vec<_> = report.findings.iter().map(|finding| (finding.code, finding.message.clone())).collect();
+        (report.explored, report.left, found)
+    };
+    let once = followed("0.7", "0.7");
+    assert_eq!(once, followed("0.7", "0.6"));
+    // 1.0 is what the property has by itself: that it is set changes nothing there.
+    let (left, right) = (followed("1.0", "0.6"), followed("0.6", "1.0"));
+    assert!(left.0.states > once.0.states && right.0.states > once.0.states, "{left:?} {right:?} {once:?}");
+}
+
+#[test]
+fn a_value_that_is_wrong_is_told_though_what_follows_is_known() {
+    let narrow = ("arm.yaml", "k: { type: float, default: 1.0 }", "k: { type: float, default: 1.0, min: 0.3 }");
+    let with = |right: &str| {
+        let text = format!("right: {{ deployment: arm.yaml, parameters: {{ gain: {right} }} }}");
+        let files = files(&[narrow, ("pair.yaml", "right: { deployment: arm.yaml }", &text)]);
+        let whole = load(&files, "pair.yaml", &[]).deployment.unwrap();
+        let report = check::run(whole.clone(), &catalogue(&whole));
+        let codes = report.findings.iter().filter(|finding| finding.severity == Severity::Error);
+        codes.map(|finding| finding.code.0).collect::<Vec<_>>()
+    };
+    assert!(with("0.6").is_empty(), "{:?}", with("0.6"));
+    assert_eq!(with("0.2").len(), 1, "{:?}", with("0.2"));
+}
+
+/// A component with two properties that two alternatives set, the values being those of the file's parameters.
+fn valued(values: &[f64; 6]) -> Deployment {
+    let [a, b, c, d, e, f] = values;
+    let deployment = "davit: 1
+name: valued
+platform: simulated
+types:
+  T: { properties: { k: { type: float, default: 1.0 }, m: { type: float, default: 1.0 } } }
+configurations: [conf.lua]
+coordinator: coordinator.lua
+deploy: { event: e_start, up: on, within_s: 5 }
+shutdown: { event: e_shutdown, down: idle, within_s: 5 }
+operator: [by_hand]
+";
+    let configurations = format!(
+        "ConfiguratorConf {{
+  make = Configuration {{ create('T1', 'T', {{ properties = {{ k = {a} }} }}) }},
+  one = Configuration {{ group = 'mode', property_set('T1.k', {b}) }},
+  two = Configuration {{ group = 'mode', property_set('T1.k', {c}), property_set('T1.m', {d}) }},
+  over = Configuration {{ property_set('T1.m', {e}) }},
+  by_hand = Configuration {{ property_set('T1.k', {f}) }},
+}}"
+    );
+    let coordinator = "return state {
+  idle = state {}, making = state { entry = 'make' },
+  on = state { one = state { config = 'one' }, two = state { config = 'two', entry = 'over' },
+    trans { src = 'initial', tgt = 'one' }, trans { src = 'one', tgt = 'two', events = { 'e_two' } },
+    trans { src = 'two', tgt = 'one', events = { 'e_one' }, effect = 'over.undo' } },
+  off = state { entry = 'make.undo' },
+  trans { src = 'initial', tgt = 'idle' }, trans { src = 'idle', tgt = 'making', events = { 'e_start' } },
+  trans { src = 'making', tgt = 'on', events = { 'make.ok' } }, trans { src = 'making', tgt = 'idle', events = { 'make.failed' } },
+  trans { src = 'on', tgt = 'off', events = { 'e_shutdown' } }, trans { src = 'off', tgt = 'idle', events = { 'make.undone' } },
+}";
+    let sources = Sources::memory([
+        ("valued.yaml", deployment.to_owned()),
+        ("conf.lua", configurations),
+        ("coordinator.lua", coordinator.to_owned()),
+    ]);
+    let loaded = load(&sources, "valued.yaml", &[]);
+    loaded.deployment.unwrap_or_else(|| panic!("{:#?}", loaded.findings))
+}
+
+#[test]
+fn what_follows_from_one_follows_from_what_is_alike() {
+    let mut seed = 0x2545_F491_4F6C_DD1D_u64;
+    let mut pick = move |of: usize| {
+        seed ^= seed << 13;
+        seed ^= seed >> 7;
+        seed ^= seed << 17;
+        usize::try_from(seed % of as u64).unwrap()
+    };
+    let seen = |of: &Deployment| {
+        let report = check::run(of.clone(), &catalogue(of));
+        let told: Vec<_> =
+            report.findings.iter().map(|finding| (finding.code, finding.severity, finding.message.clone())).collect();
+        (report.explored, report.left, told, report.traces)
+    };
+    let (mut alike, mut differ, mut follows) = (0, 0, 0);
+    for _ in 0..400 {
+        let mut values = || [(); 6].map(|()| [1.0, 1.5, 2.0, 2.5][pick(4)]);
+        let both = [values(), values()];
+        let [one, other] = both.map(|values| valued(&values));
+        let same = is_alike(&one, &other, &catalogue(&one));
+        assert_eq!(same, is_alike(&other, &one, &catalogue(&one)), "both ways: {both:?}");
+        if !same && differ > 60 {
+            continue;
+        }
+        let of = [seen(&one), seen(&other)];
+        let agree = of[0] == of[1];
+        match same {
+            true => {
+                assert!(agree, "{both:?} {of:#?}");
+                alike += 1;
+            }
+            false => {
+                differ += 1;
+                follows += usize::from(!agree);
+            }
+        }
+    }
+    // Were two taken for alike whose values are not, that would be seen.
+    assert!(alike > 5 && follows > 10, "{alike} alike; of {differ} others {follows} lead to something else");
+}
