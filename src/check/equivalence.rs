@@ -13,6 +13,11 @@ use std::sync::{Arc, Weak};
 pub struct FrameNumber(u32);
 
 impl FrameNumber {
+    #[cfg(test)]
+    pub(super) fn of(number: u32) -> Self {
+        Self(number)
+    }
+
     /// As a place in a list.
     pub fn index(self) -> usize {
         self.0 as usize

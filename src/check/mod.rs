@@ -61,6 +61,7 @@ mod nowhere;
 mod offers;
 mod once;
 mod orders;
+mod other_frames;
 mod outcome;
 mod outside;
 mod places;
