@@ -210,9 +210,14 @@ impl Stack {
         &self.frames
     }
 
-    /// Takes the same frames from elsewhere: who keeps thousands of stacks has each once.
-    pub fn share(&mut self, same: impl FnMut(&Arc<Frame>) -> Arc<Frame>) {
-        self.frames = self.frames.iter().map(same).collect();
+    /// Takes the same frames from elsewhere, where there are others: who keeps thousands of stacks has each once.
+    pub fn share(&mut self, mut same: impl FnMut(&Arc<Frame>) -> Option<Arc<Frame>>) {
+        for frame in &mut self.frames {
+            if let Some(other) = same(frame) {
+                *frame = other;
+            }
+        }
+        self.frames.shrink_to_fit();
     }
 
     /// Whether so many more frames of a requester are within its bound.

@@ -195,7 +195,7 @@ fn what_differs_in_numbers_alone_is_squashed_once() {
     let mut next = 100;
     other.share(|frame| {
         next += 1;
-        Arc::new(super::super::Frame { id: FrameId(next), ..(**frame).clone() })
+        Some(Arc::new(super::super::Frame { id: FrameId(next), ..(**frame).clone() }))
     });
     let third = of(3);
     let planned = bench.ask(&[push(&third)]).expect("it fits");
