@@ -315,8 +315,7 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
 
     /// Their own file takes components away: what frames of others did to them is void from now on.
     fn is_taken_away(&mut self, gone: impl Iterator<Item = ComponentName>, edits: &mut Edits) {
-        let matters = |of: &ComponentName| self.frames.iter().any(|frame| void::is_foreign(frame, *of));
-        let mut gone: Vec<ComponentName> = gone.filter(matters).collect();
+        let mut gone: Vec<ComponentName> = void::touched_from_outside(&self.frames, gone);
         if !gone.is_empty() {
             gone.sort_unstable();
             void::take_out(&mut self.frames, &|frame, of| gone.contains(&of) && void::is_foreign(frame, of));
