@@ -222,7 +222,8 @@ impl Stack {
 
     /// Whether so many more frames of a requester are within its bound.
     pub fn has_room(&self, by: Requester, more: usize) -> bool {
-        self.frames.iter().filter(|frame| frame.requester == by).count() + more <= self.bound
+        self.frames.len() + more <= self.bound
+            || self.frames.iter().filter(|frame| frame.requester == by).count() + more <= self.bound
     }
 
     /// How many frames there are.

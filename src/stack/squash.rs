@@ -117,7 +117,8 @@ pub(super) fn fits(frames: &[Arc<Frame>], quota: Quota<'_>, memory: Option<&Memo
 
 /// Squashes until a pile has at most `bound` frames. False: no two could be squashed.
 pub(super) fn fit(frames: &mut Vec<Arc<Frame>>, quota: Quota<'_>, memory: Option<&Memory>) -> bool {
-    while quota.own(frames).count() > quota.bound {
+    // Most stacks have fewer frames than one pile may have.
+    while frames.len() > quota.bound && quota.own(frames).count() > quota.bound {
         let Some(Pair { lower, upper, way }) = pair(frames, quota) else { return false };
         let (made, stays, goes) = match (way, memory) {
             (Passage::Up(left, hand), _) => {
@@ -161,12 +162,18 @@ fn pair(frames: &[Arc<Frame>], quota: Quota<'_>) -> Option<Pair> {
 fn among(frames: &[Arc<Frame>], quota: Quota<'_>, may: &dyn Fn(&Frame) -> bool) -> Option<Pair> {
     // A partial frame is undone by its name.
     let free = |f: &Frame| f.scope.is_none() && !f.partial && !quota.busy.contains(&f.id) && may(f);
-    let own: Vec<usize> = quota.own(frames).collect();
+    let own: SmallVec<[usize; 96]> = quota.own(frames).collect();
     let newest = own.last().copied();
-    let pairs = own.windows(2).map(|two| (two[0], two[1])).filter(|(a, b)| free(&frames[*a]) && free(&frames[*b]));
+    let mut lower = own.first().copied().filter(|at| free(&frames[*at]));
+    let mut pairs: SmallVec<[(usize, usize); 96]> = SmallVec::new();
+    for upper in own.iter().skip(1).copied() {
+        let fits = free(&frames[upper]).then_some(upper);
+        pairs.extend(lower.zip(fits));
+        lower = fits;
+    }
     // What lies between is looked at last: that takes longest.
     let first = |fits: &dyn Fn(usize, usize) -> bool| {
-        let mut fitting = pairs.clone().filter(|(a, b)| fits(*a, *b));
+        let mut fitting = pairs.iter().copied().filter(|(a, b)| fits(*a, *b));
         fitting.find_map(|(lower, upper)| Some(Pair { lower, upper, way: way(frames, lower, upper, quota.busy)? }))
     };
     // The newest frame stays by itself as long as there is any other way: it is the one most likely to be undone.
@@ -196,7 +203,7 @@ fn way(frames: &[Arc<Frame>], lower: usize, upper: usize, busy: &[FrameId]) -> O
     if frames[lower + 1..upper].iter().all(|between| !share::shares(&frames[upper], between)) {
         return Some(Passage::Down);
     }
-    let hand = share::examine(&frames[..upper], lower).ok()?;
+    let hand = share::free(&frames[..upper], lower)?;
     let (old, new) = (&frames[lower], &frames[upper]);
     // What a run state serves is not taken apart.
     let again = |slot: Slot| {
