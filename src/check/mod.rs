@@ -37,6 +37,7 @@ mod failing;
 #[cfg(any(test, feature = "internals"))]
 mod follow;
 mod frame_orders;
+mod frontier;
 mod heard;
 mod held;
 mod ignored;
