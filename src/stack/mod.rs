@@ -102,7 +102,7 @@ pub struct Frame {
     /// Why undo does not pass it, if it does not.
     pub floor: Option<String>,
     /// What was squashed into it; empty for a frame of its own.
-    pub parts: BTreeSet<Buried>,
+    pub parts: Arc<BTreeSet<Buried>>,
     /// The state of its coordinator that it belongs to, while that is active: such a frame is never squashed.
     pub scope: Option<Scope>,
     /// It is what was done and not taken back of something that ended *broken*.

@@ -2,13 +2,13 @@
 
 use super::net::reduce;
 use super::share::{self, HandOver};
-use super::{Frame, FrameId, Inverse, Pile};
+use super::{Buried, Frame, FrameId, Inverse, Pile};
 use crate::limits;
 use crate::model::{MemberRef, Step};
 use crate::plan::footprint::{Footprint, Slot, Touch};
 use crate::plan::undo::{DraftStep, absolute, items};
 use crate::system::System;
-use rustc_hash::{FxHashMap, FxHashSet};
+use rustc_hash::{FxBuildHasher, FxHashMap, FxHashSet};
 use smallvec::SmallVec;
 use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -241,31 +241,45 @@ pub(super) fn list(frame: &Frame) -> Vec<DraftStep> {
     }
 }
 
-/// Two neighbours as one frame.
-pub(super) fn squash(lower: &Frame, upper: &Frame) -> Frame {
-    let mut parts: BTreeSet<_> = lower.parts.iter().chain(&upper.parts).copied().collect();
-    for frame in [lower, upper] {
-        if !frame.is_squashed() {
-            parts.insert(frame.buried());
+/// What becomes one frame. Where the upper one adds nothing it is what the lower one has: such frames are kept for long, and by
+/// whoever follows thousands of stacks in great number.
+fn parts(lower: &Frame, upper: &Frame) -> Arc<BTreeSet<Buried>> {
+    let mut parts = lower.parts.clone();
+    let own = [lower, upper].into_iter().filter(|frame| !frame.is_squashed()).map(Frame::buried);
+    for part in upper.parts.iter().copied().chain(own) {
+        if !parts.contains(&part) {
+            Arc::make_mut(&mut parts).insert(part);
         }
     }
-    let mut seen: FxHashSet<(Slot, u8, Option<Slot>)> = FxHashSet::default();
-    let mut touches: Vec<Touch> = lower
-        .footprint
-        .touches
-        .iter()
-        .chain(&upper.footprint.touches)
-        .filter(|t| seen.insert((t.slot, t.access as u8, t.serves)))
-        .copied()
-        .collect();
-    // Such frames are kept for long, and by whoever follows thousands of stacks in great number.
-    touches.shrink_to_fit();
+    parts
+}
+
+/// What both touch, each once.
+fn footprint(lower: &Arc<Footprint>, upper: &Footprint) -> Arc<Footprint> {
+    let most = lower.touches.len() + upper.touches.len();
+    let mut seen: FxHashSet<(Slot, u8, Option<Slot>)> = FxHashSet::with_capacity_and_hasher(most, FxBuildHasher);
+    let mut is_new = |touch: &&Touch| seen.insert((touch.slot, touch.access as u8, touch.serves));
+    let own: Vec<&Touch> = lower.touches.iter().filter(&mut is_new).collect();
+    let more: Vec<&Touch> = upper.touches.iter().filter(is_new).collect();
+    if more.is_empty() && own.len() == lower.touches.len() {
+        return lower.clone();
+    }
+    let mut touches = Vec::with_capacity(own.len() + more.len());
+    touches.extend(own.into_iter().chain(more));
+    Arc::new(Footprint { touches })
+}
+
+/// Two neighbours as one frame.
+pub(super) fn squash(lower: &Frame, upper: &Frame) -> Frame {
+    let parts = parts(lower, upper);
+    let footprint = footprint(&lower.footprint, &upper.footprint);
     let mut slots: FxHashSet<Slot> = FxHashSet::default();
     let saved = lower.saved.iter().chain(&upper.saved).filter(|s| slots.insert(s.slot)).cloned().collect();
     let mut floor = lower.floor.clone().or_else(|| upper.floor.clone());
     let mut inverse = Vec::new();
     if floor.is_none() {
-        let bound: FxHashSet<MemberRef> = touches
+        let bound: FxHashSet<MemberRef> = footprint
+            .touches
             .iter()
             .filter_map(|t| match (t.slot, t.serves) {
                 (Slot::State(_), Some(Slot::Property(property))) => Some(property),
@@ -290,8 +304,12 @@ pub(super) fn squash(lower: &Frame, upper: &Frame) -> Frame {
         group: None,
         requester: upper.requester,
         at: upper.at,
-        inverse: Inverse::List(Arc::new(inverse)),
-        footprint: Arc::new(Footprint { touches }),
+        // Going round and round leads back to where it began.
+        inverse: match &lower.inverse {
+            Inverse::List(list) if **list == inverse => Inverse::List(list.clone()),
+            _ => Inverse::List(Arc::new(inverse)),
+        },
+        footprint,
         saved,
         floor,
         parts,

@@ -391,7 +391,7 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
             footprint: footprint.clone(),
             saved: saved.clone(),
             floor: floor.clone(),
-            parts: std::collections::BTreeSet::new(),
+            parts: Arc::default(),
             scope,
             partial: false,
             safe: configuration.safe,
@@ -428,7 +428,7 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
             self.replaced = true;
             return self.pop(at, Some(configuration), edits).map_err(|refusal| refused(refusal.findings, old.as_str()));
         }
-        let buried = self.frames.iter().flat_map(|f| &f.parts).find(|p| p.group == Some(group));
+        let buried = self.frames.iter().flat_map(|f| f.parts.iter()).find(|p| p.group == Some(group));
         if let Some(part) = buried {
             let message = format!("`{}` was squashed together with other frames", part.configuration);
             let cause = Finding::error(codes::STACK_SQUASHED, message).help("undo down to the squashed frame");
