@@ -4,18 +4,13 @@ use super::desks::{AnsweredPlaces, Coming, is_left};
 use super::product::{Product, as_begun};
 use super::reactions::Macrostep;
 use super::seldom::Interrupted;
-use super::state::{ProductState, States, bit, one};
+use super::state::{ProductState, States, add, bit, one};
 use crate::limits;
-use crate::model::{Ask, ConfigId, Findings, Verdict, codes};
+use crate::model::{Ask, ConfigId, Verdict};
 use crate::stack::{ActiveBatch, Arrived, Batch, Desk, LedDown, Request, Requester, Why, given_up_of};
 use crate::statechart::EventId;
 use smallvec::SmallVec;
 use std::rc::Rc;
-
-/// Whether a push is refused because the stack is full.
-fn is_for_room(why: &Findings) -> bool {
-    why.iter().any(|finding| finding.code == codes::STACK_FULL)
-}
 
 impl Product<'_> {
     /// A coordinator hears an event, and comes to rest again.
@@ -121,14 +116,14 @@ impl Product<'_> {
             self.forked |= landed.len() > limits::CHECK_FORKS;
             landed.truncate(limits::CHECK_FORKS);
         }
-        states.extend(landed);
+        add(&mut states, landed);
         states
     }
 
     fn all_arrive(&mut self, states: States, batch: &Batch) -> States {
         let mut arrived = States::new();
         for state in states {
-            arrived.extend(self.arrive(state, batch));
+            add(&mut arrived, self.arrive(state, batch));
         }
         arrived
     }
@@ -183,7 +178,11 @@ impl Product<'_> {
                 }
             }
         }
-        states.insert(0, self.take_in(state, batch, &coming));
+        let first = self.take_in(state, batch, &coming);
+        if states.is_empty() {
+            return one(first);
+        }
+        states.insert(0, first);
         states
     }
 
@@ -318,18 +317,17 @@ impl Product<'_> {
     /// The next batch that may begin does: its number.
     fn begin_next(&self, state: &mut ProductState) -> Option<u32> {
         let ProductState { desk, world, leaving, seldom, .. } = state;
-        let safe = &seldom.get().safe;
+        desk.waiting().next()?;
+        let asked = seldom.get().safe.iter().map(|request| request.ask);
+        let safe: SmallVec<[ConfigId; 1]> =
+            asked.filter_map(|ask| if let Ask::Apply(id) = ask { Some(id) } else { None }).collect();
         let alone = |batch: &Batch| (*leaving && self.worlds.goes_alone(*world, batch)).then_some(LedDown::Whole);
-        if desk.waiting().any(|batch| alone(batch).is_some()) || !safe.is_empty() {
-            let asked = safe.iter().map(|request| request.ask);
-            let safe: Vec<ConfigId> =
-                asked.filter_map(|ask| if let Ask::Apply(id) = ask { Some(id) } else { None }).collect();
+        if desk.waiting().any(|batch| alone(batch).is_some()) {
             let begin =
                 |desk: &mut Desk| desk.begin_next(&self.worlds.claims, alone, &safe).map(|active| active.number);
             return self.desks.change(desk, begin);
         }
-        desk.waiting().next()?;
-        self.desks.begin_next(desk, &self.worlds.claims)
+        self.desks.begin_next(desk, safe, &self.worlds.claims)
     }
 
     /// Whatever can begin does; nothing of a (sub)system of which a safe configuration is being applied.
@@ -375,9 +373,7 @@ impl Product<'_> {
             });
         }
         let Some(active) = state.desk.active(number) else { return };
-        if self.worlds.is_tight(state.world, &active.batch.requests)
-            && !self.comes(state, number).refused.iter().any(|(_, why)| is_for_room(why))
-        {
+        if self.worlds.is_tight(state.world, &active.batch.requests) && !self.comes(state, number).lacks_room() {
             state.change(|seldom| seldom.placed.push(number));
         }
     }

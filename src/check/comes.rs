@@ -6,7 +6,7 @@ use super::stands::never;
 use super::world::Worlds;
 use crate::model::{Ask, Findings};
 use crate::plan::PlannedStep;
-use crate::stack::{Ending, Endings, FrameId, Group, Planned, Reason, Request, Rules, Stopped, settle, take_up};
+use crate::stack::{Ending, Endings, FrameId, Group, Planned, Reason, Request, Rules, Stopped, held, settle, take_up};
 use crate::transaction::can_fail;
 use smallvec::SmallVec;
 use std::cell::OnceCell;
@@ -16,7 +16,15 @@ use std::sync::Arc;
 impl Worlds<'_> {
     /// What the rest of a batch comes to in a world that is known.
     pub fn comes(&mut self, id: WorldId, asks: &PlainBatch, concurrent: &ConcurrentWork) -> Rc<Comes> {
-        let key = (id, asks.clone(), concurrent.clone());
+        let mut key = (id, asks.clone(), concurrent.clone());
+        if concurrent.placed {
+            // What finds its place comes to the same as what has one.
+            key.2.placed = false;
+            if let Some(known) = self.comes.get(&key).filter(|known| !known.lacks_room()) {
+                return known.clone();
+            }
+            key.2.placed = true;
+        }
         if let Some(known) = self.comes.get(&key) {
             return known.clone();
         }
@@ -47,6 +55,7 @@ impl Worlds<'_> {
         let planned = group.planned.take();
         let warnings = planned.as_ref().map(|planned| planned.warnings.clone()).filter(|warnings| !warnings.is_empty());
         let warnings = warnings.map(Rc::new);
+        let holds = planned.iter().flat_map(held).collect();
         let can_fail = planned.as_ref().map(can_fail).unwrap_or_default();
         let mut ends =
             |endings: &[Ending]| self.after(id, requests, &group, planned.as_ref(), endings, &concurrent.held);
@@ -71,7 +80,7 @@ impl Worlds<'_> {
         let stopped = stopped.collect();
         let hollow = self.hollow(done.world, &group, planned.as_ref());
         let (group, ends) = (DecidedGroup::of(&group), OnceCell::new());
-        Comes { group, refused, hollow, warnings, can_fail, done, stopped, ends }
+        Comes { group, refused, hollow, warnings, holds, can_fail, done, stopped, ends }
     }
 
     /// The requests of a group that say what is false in the world in which all of it is done.

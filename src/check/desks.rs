@@ -77,7 +77,7 @@ pub struct Desks {
     asks: KeptValues<SmallVec<[Request; 2]>>,
     of_batches: RefCell<FxHashMap<(KeptDesk, u32), PlainBatch>>,
     comings: RefCell<FxHashMap<Batch, FxHashMap<KeptDesk, Rc<Coming>>>>,
-    begins: Worked<(), Option<u32>>,
+    begins: Worked<SmallVec<[ConfigId; 1]>, Option<u32>>,
     givens: KeptValues<AnsweredPlaces>,
     answered: Worked<(u32, KeptValue<AnsweredPlaces>), Rc<AnsweredBatch>>,
     given_up: Worked<(u32, Request), Option<usize>>,
@@ -183,9 +183,11 @@ impl Desks {
         Coming { desk: after, arrived: arrival.in_order().collect(), stops, about, meddles }
     }
 
-    /// The next batch that may begin does: its number. None goes alone.
-    pub fn begin_next(&self, desk: &mut KeptDesk, claims: &Claims) -> Option<u32> {
-        self.once(&self.begins, desk, (), |desk, ()| desk.begin_next(claims, |_| None, &[]).map(|active| active.number))
+    /// The next batch that may begin does while these safe configurations are being applied: its number. None goes alone.
+    pub fn begin_next(&self, desk: &mut KeptDesk, safe: SmallVec<[ConfigId; 1]>, claims: &Claims) -> Option<u32> {
+        self.once(&self.begins, desk, safe, |desk, safe| {
+            desk.begin_next(claims, |_| None, &safe).map(|active| active.number)
+        })
     }
 
     /// Answers, known by a number.

@@ -13,6 +13,11 @@ use std::sync::{Arc, Weak};
 pub struct FrameNumber(u32);
 
 impl FrameNumber {
+    #[cfg(test)]
+    pub(super) fn of(number: u32) -> Self {
+        Self(number)
+    }
+
     /// As a place in a list.
     pub fn index(self) -> usize {
         self.0 as usize
@@ -29,17 +34,28 @@ pub struct FrameBook {
     /// Those of which worlds are made, each once.
     kept: FxHashMap<(FrameNumber, FrameId), Arc<Frame>>,
     /// By address, which is not used again as long as it is known here. What a frame contains goes with the last world that has it.
-    known: FxHashMap<usize, (FrameNumber, Weak<Frame>)>,
+    known: FxHashMap<usize, KnownFrame>,
     /// With so many of them, those that are gone are forgotten.
     forgets_at: usize,
+}
+
+/// What is known of a frame at an address.
+struct KnownFrame {
+    number: FrameNumber,
+    frame: Weak<Frame>,
+    /// It is one of those of which worlds are made.
+    kept: bool,
+}
+
+fn address(frame: &Arc<Frame>) -> usize {
+    Arc::as_ptr(frame) as usize
 }
 
 impl FrameBook {
     /// The number of what a frame contains.
     pub fn number(&mut self, frame: &Arc<Frame>) -> FrameNumber {
-        let address = Arc::as_ptr(frame) as usize;
-        if let Some((number, _)) = self.known.get(&address) {
-            return *number;
+        if let Some(known) = self.known.get(&address(frame)) {
+            return known.number;
         }
         let mut hasher = FxHasher::default();
         hash_frame(frame, &mut hasher);
@@ -54,27 +70,31 @@ impl FrameBook {
             }
         };
         if self.known.len() >= self.forgets_at {
-            self.known.retain(|_, (_, frame)| frame.strong_count() > 0);
+            self.known.retain(|_, known| known.frame.strong_count() > 0);
             self.forgets_at = (2 * self.known.len()).max(1024);
         }
-        self.known.insert(address, (FrameNumber(number), Arc::downgrade(frame)));
-        FrameNumber(number)
+        let number = FrameNumber(number);
+        self.known.insert(address(frame), KnownFrame { number, frame: Arc::downgrade(frame), kept: false });
+        number
     }
 
-    /// The frame of that number that contains the same, as it was first kept. All that contain the same share it.
-    pub fn keep(&mut self, frame: &Arc<Frame>) -> Arc<Frame> {
+    /// The frame of that number that contains the same, as it was first kept; none: it is that one. All that contain the same share it.
+    pub fn keep(&mut self, frame: &Arc<Frame>) -> Option<Arc<Frame>> {
         let number = self.number(frame);
         let Self { kept, frames, known, .. } = self;
+        if known.get(&address(frame)).is_some_and(|of| of.kept) {
+            return None;
+        }
         let make = || {
             let first = &frames[number.0 as usize];
             if Arc::ptr_eq(first, frame) {
                 return frame.clone();
             }
-            let made = Arc::new(Frame { id: frame.id, at: frame.at, ..(**first).clone() });
-            known.insert(Arc::as_ptr(&made) as usize, (number, Arc::downgrade(&made)));
-            made
+            Arc::new(Frame { id: frame.id, at: frame.at, ..(**first).clone() })
         };
-        kept.entry((number, frame.id)).or_insert_with(make).clone()
+        let same = kept.entry((number, frame.id)).or_insert_with(make);
+        known.insert(address(same), KnownFrame { number, frame: Arc::downgrade(same), kept: true });
+        (!Arc::ptr_eq(same, frame)).then(|| same.clone())
     }
 
     /// Whether a frame above another one may keep that from being undone, take over from it or keep what it has called: not where they
@@ -142,6 +162,13 @@ fn hash_value(value: &Value, hasher: &mut impl Hasher) {
     }
 }
 
+/// A hash whose sum with others tells them apart. As it is it grows by as much for one value in whatever component: all systems in which as
+/// many components have it would have one sum.
+fn mixed(hash: u64) -> u64 {
+    let hash = (hash ^ (hash >> 32)).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    hash ^ (hash >> 29)
+}
+
 /// The same for systems that are the same, in whatever order they were built.
 pub fn hash_system(system: &System, hasher: &mut impl Hasher) {
     let mut sum = 0u64;
@@ -153,12 +180,12 @@ pub fn hash_system(system: &System, hasher: &mut impl Hasher) {
             port.hash(&mut own);
             hash_value(value, &mut own);
         }
-        sum = sum.wrapping_add(own.finish());
+        sum = sum.wrapping_add(mixed(own.finish()));
     });
     system.for_each_link(&mut |from, to, policy| {
         let mut own = FxHasher::default();
         (from, to, policy).hash(&mut own);
-        sum = sum.wrapping_add(own.finish());
+        sum = sum.wrapping_add(mixed(own.finish()));
     });
     sum.hash(hasher);
 }

@@ -8,6 +8,7 @@ use super::bound::Bound;
 use super::chunks::Chunks;
 use super::edges::{Barred, Edge, NOWHERE, Tells};
 use super::effort::{Far, Halt};
+use super::frontier::Frontier;
 use super::met::MetStates;
 use super::outcome::WorldId;
 use super::product::Product;
@@ -21,8 +22,6 @@ use crate::stack::Requester;
 use indexmap::IndexMap;
 use rustc_hash::{FxBuildHasher, FxHashMap, FxHashSet};
 use std::cell::OnceCell;
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
 use std::rc::Rc;
 
 /// Everything that was followed.
@@ -58,7 +57,7 @@ pub struct Graph<'p, 'a> {
     out: OnceCell<Adjacency>,
     into: OnceCell<Adjacency>,
     pub(super) depth: Vec<u32>,
-    open: BinaryHeap<Reverse<(Failed, u32, u32)>>,
+    open: Frontier,
     /// For each class the shortest ways with nothing worse.
     pub(super) ways: FxHashMap<Failed, Ways>,
     /// Which steps of the simulated platform's reactions are done on edges on which nothing fails, by the reactions' places.
@@ -106,7 +105,7 @@ pub fn explore<'p, 'a>(product: &'p mut Product<'a>) -> Graph<'p, 'a> {
         out: OnceCell::new(),
         into: OnceCell::new(),
         depth: Vec::new(),
-        open: BinaryHeap::new(),
+        open: Frontier::default(),
         ways: FxHashMap::default(),
         reacts: FxHashMap::default(),
         in_vain: Vec::new(),
@@ -145,7 +144,7 @@ fn share_of(failed: Failed, of: usize) -> usize {
 impl Graph<'_, '_> {
     fn run(&mut self) {
         let mut looked_at = 0;
-        while let Some(Reverse((failed, _, at))) = self.open.pop() {
+        while let Some((failed, at)) = self.open.pop() {
             if self.followed[at as usize] || failed > self.failed[at as usize] {
                 continue;
             }
@@ -187,11 +186,11 @@ impl Graph<'_, '_> {
             self.failed.push(failed);
             self.depth.push(depth);
             self.followed.push(false);
-            self.open.push(Reverse((failed, depth, id)));
+            self.open.push(failed, depth, id);
         } else if (failed, depth) < (self.failed[id as usize], self.depth[id as usize]) && !self.followed[id as usize] {
             self.failed[id as usize] = failed;
             self.depth[id as usize] = depth;
-            self.open.push(Reverse((failed, depth, id)));
+            self.open.push(failed, depth, id);
         }
         id
     }
@@ -381,9 +380,10 @@ impl Graph<'_, '_> {
 
     /// The states, those with the least failing and the shortest ways first.
     pub fn in_order(&self) -> Vec<u32> {
-        let mut order: Vec<u32> = (0..u32::try_from(self.states.len()).unwrap_or(NOWHERE)).collect();
-        order.sort_by_key(|at| (self.failed[*at as usize], self.depth[*at as usize]));
-        order
+        let all = self.failed.iter().zip(&self.depth).zip(0u32..);
+        let mut order: Vec<(Failed, u32, u32)> = all.map(|((failed, depth), at)| (*failed, *depth, at)).collect();
+        order.sort_unstable();
+        order.into_iter().map(|(_, _, at)| at).collect()
     }
 
     /// How far it went.

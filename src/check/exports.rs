@@ -5,13 +5,13 @@ use super::coordinator::ask_of;
 use super::explore::Graph;
 use super::judge::{Traced, severity_of};
 use super::state::{Failed, Move};
+use super::systems::SystemId;
 use crate::model::codes::COMPOSE_UNLEFT;
-use crate::model::{Ask, ChangeKind, ComponentName, ConfigId, Finding, Origin, SubsystemStanding};
+use crate::model::{Ask, ChangeKind, ComponentName, ConfigId, Configuration, Finding, Origin, SubsystemStanding};
 use crate::stack::claims;
 use crate::statechart::{EventId, NodeId};
 use crate::system::View;
 use rustc_hash::{FxHashMap, FxHashSet};
-use std::collections::VecDeque;
 
 impl Graph<'_, '_> {
     /// A subsystem takes nothing away that it has promised.
@@ -49,12 +49,17 @@ impl Graph<'_, '_> {
     /// Something exported is not there while it is promised.
     fn taken_away(&mut self, promised: Vec<u32>, exported: &[ComponentName], found: &mut Traced) {
         let mut lacking = Vec::new();
+        // Thousands of worlds have some hundred systems.
+        let mut lacks: FxHashMap<SystemId, bool> = FxHashMap::default();
         for at in promised {
             let state = &self.states[at as usize];
             let Some(world) = self.product.worlds.get(state.world) else { continue };
-            let mut there = 0;
-            world.system.for_each_component(&mut |node| there += usize::from(exported.contains(&node.name)));
-            if there < exported.len() {
+            let of = || {
+                let mut there = 0;
+                world.system.for_each_component(&mut |node| there += usize::from(exported.contains(&node.name)));
+                there < exported.len()
+            };
+            if *lacks.entry(self.product.worlds.system(state.world)).or_insert_with(of) {
                 lacking.push(at);
             }
         }
@@ -78,17 +83,22 @@ impl Graph<'_, '_> {
     /// Something exported is taken away and made anew while it is promised, which its parent is connected to.
     fn remade(&mut self, promised: &[u32], exported: &[ComponentName], found: &mut Traced) {
         let deployment = self.product.deployment;
-        let remakes = |id: &ConfigId| {
-            let mut changes = deployment.configuration(*id)?.changes.iter();
-            changes.find_map(|change| match change.kind {
+        let remakes = |of: &Configuration| {
+            of.changes.iter().find_map(|change| match change.kind {
                 ChangeKind::Destroy { component } | ChangeKind::Replace { component, .. }
                     if exported.contains(&component) =>
                 {
-                    Some((*id, component, change.origin))
+                    Some((of.id, component, change.origin))
                 }
                 _ => None,
             })
         };
+        let remake: FxHashMap<ConfigId, (ConfigId, ComponentName, Origin)> =
+            deployment.configurations.iter().filter_map(|of| Some((of.id, remakes(of)?))).collect();
+        if remake.is_empty() {
+            return;
+        }
+        let remakes = |id: &ConfigId| remake.get(id).copied();
         let mut some: FxHashMap<ConfigId, (ComponentName, Origin, Vec<u32>)> = FxHashMap::default();
         for at in promised {
             let state = &self.states[*at as usize];
@@ -204,23 +214,23 @@ impl Graph<'_, '_> {
             Move::Taken(number, event) => graph.product.members[usize::from(number)].name_of(event) == Some(until),
             _ => false,
         };
-        let mut met: FxHashSet<u32> = FxHashSet::default();
-        let mut open: VecDeque<u32> = VecDeque::new();
+        let mut met = vec![false; self.states.len()];
+        let mut open: Vec<u32> = Vec::new();
         for edge in self.edges.iter() {
-            if says(self, edge.from, edge.to) && !ends(self, self.by(edge)) && met.insert(edge.to) {
-                open.push_back(edge.to);
+            if !met[edge.to as usize] && says(self, edge.from, edge.to) && !ends(self, self.by(edge)) {
+                met[edge.to as usize] = true;
+                open.push(edge.to);
             }
         }
-        while let Some(at) = open.pop_front() {
+        while let Some(at) = open.pop() {
             for edge in self.outgoing().of(at) {
                 let edge = &self.edges[*edge as usize];
-                if !ends(self, self.by(edge)) && met.insert(edge.to) {
-                    open.push_back(edge.to);
+                if !met[edge.to as usize] && !ends(self, self.by(edge)) {
+                    met[edge.to as usize] = true;
+                    open.push(edge.to);
                 }
             }
         }
-        let mut all: Vec<u32> = met.into_iter().collect();
-        all.sort_unstable();
-        all
+        (0u32..).zip(met).filter(|(_, met)| *met).map(|(at, _)| at).collect()
     }
 }

@@ -3,7 +3,7 @@
 use super::arrive::is_for_somebody;
 use super::product::Product;
 use super::seldom::Unconfirmed;
-use super::state::{Answers, Failed, Move, Next, Nexts, ProductState, States, index};
+use super::state::{Answers, Failed, Move, Next, Nexts, ProductState, States, add, index};
 use crate::limits;
 use crate::model::{Ask, EventName};
 use crate::statechart::EventId;
@@ -113,7 +113,7 @@ impl Product<'_> {
                     Some(number) => {
                         let event = self.members[number].answer(request.ask, verdict);
                         nexts.troubles.extend(self.unheard_revert(&state, number, &request, verdict));
-                        heard.extend(self.react(state, number, event));
+                        add(&mut heard, self.react(state, number, event));
                     }
                     None => heard.push(state),
                 }

@@ -22,9 +22,14 @@ impl Worlds<'_> {
     fn held_and_staying(&mut self, id: WorldId, asks: &PlainBatch, begun: &ConcurrentWork) -> &(Held, Held) {
         let key = (id, asks.clone(), begun.clone());
         if !self.helds.contains_key(&key) {
-            let group = self.group(id, asks, begun).unwrap_or_default();
-            let stay = group.stay.iter().map(|(_, frame)| *frame).collect();
-            let of = (group.planned.iter().flat_map(held).collect(), stay);
+            let of = match self.comes.get(&key) {
+                Some(known) => (known.holds.iter().copied().collect(), known.group.staying().collect()),
+                None => {
+                    let group = self.group(id, asks, begun).unwrap_or_default();
+                    let stay = group.stay.iter().map(|(_, frame)| *frame).collect();
+                    (group.planned.iter().flat_map(held).collect(), stay)
+                }
+            };
             self.helds.insert(key.clone(), of);
         }
         &self.helds[&key]

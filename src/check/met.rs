@@ -31,6 +31,26 @@ impl MetStates {
         self.all.iter()
     }
 
+    /// The number of a state, if it was met.
+    pub fn find(&self, state: &ProductState) -> Option<u32> {
+        (!self.index.is_empty()).then(|| self.look_up(hash_of(state), state).ok()).flatten()
+    }
+
+    /// The number of a state; else the place in the table where it belongs.
+    fn look_up(&self, hash: u32, state: &ProductState) -> Result<u32, usize> {
+        let mut place = hash as usize & (self.index.len() - 1);
+        loop {
+            let (of, number) = self.index[place];
+            if number == FREE {
+                return Err(place);
+            }
+            if of == hash && self.all[number as usize] == *state {
+                return Ok(number);
+            }
+            place = (place + 1) & (self.index.len() - 1);
+        }
+    }
+
     /// The number of a state, and whether it was not met before.
     pub fn meet(&mut self, mut state: ProductState) -> (u32, bool) {
         // At most three quarters of the table are taken.
@@ -38,17 +58,10 @@ impl MetStates {
             self.grow();
         }
         let hash = hash_of(&state);
-        let mut place = hash as usize & (self.index.len() - 1);
-        loop {
-            let (of, number) = self.index[place];
-            if number == FREE {
-                break;
-            }
-            if of == hash && self.all[number as usize] == state {
-                return (number, false);
-            }
-            place = (place + 1) & (self.index.len() - 1);
-        }
+        let place = match self.look_up(hash, &state) {
+            Ok(number) => return (number, false),
+            Err(place) => place,
+        };
         let number = u32::try_from(self.all.len()).unwrap_or(FREE);
         self.index[place] = (hash, number);
         self.once.share(&mut state);
@@ -131,7 +144,10 @@ mod tests {
         for (number, state) in (0u32..).zip(&all) {
             assert_eq!(met.meet(state.clone()), (number, true));
         }
+        assert_eq!(met.find(&state(4000, 0, true)), None);
+        assert_eq!(MetStates::default().find(&all[0]), None);
         for (number, state) in all.iter().enumerate().rev() {
+            assert_eq!(met.find(state), u32::try_from(number).ok());
             assert_eq!(met.meet(state.clone()), (u32::try_from(number).unwrap(), false));
             assert!(met[number] == *state);
         }

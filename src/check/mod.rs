@@ -38,6 +38,7 @@ mod failing;
 #[cfg(any(test, feature = "internals"))]
 mod follow;
 mod frame_orders;
+mod frontier;
 mod heard;
 mod held;
 mod ignored;
@@ -62,6 +63,7 @@ mod nowhere;
 mod offers;
 mod once;
 mod orders;
+mod other_frames;
 mod outcome;
 mod outside;
 mod places;

@@ -2,6 +2,7 @@
 
 use super::desks::AnsweredPlaces;
 use super::kept::KeptValue;
+use crate::model::codes::STACK_FULL;
 use crate::model::{ConfigId, Findings, Verdict};
 use crate::stack::{Ending, Endings, FrameId, Group, LedDown, Request, Requester, Told};
 use crate::transaction::{Stopping, endings};
@@ -74,6 +75,8 @@ pub struct Comes {
     pub hollow: Box<[(usize, Rc<Findings>)]>,
     /// What planning warns of, if of anything.
     pub warnings: Option<Rc<Findings>>,
+    /// The frames that it pops or hands over to.
+    pub holds: Box<[FrameId]>,
     /// Of each part of the group, whether something in it can fail.
     pub can_fail: SmallVec<[bool; 2]>,
     /// When all is done.
@@ -142,6 +145,11 @@ impl DecidedGroup {
         self.places.iter().map(|place| *place as usize)
     }
 
+    /// The frames that were to be undone with the state they belong to, and stay.
+    pub fn staying(&self) -> impl Iterator<Item = FrameId> + '_ {
+        self.stay.iter().map(|(_, frame)| *frame)
+    }
+
     /// The place of the request of a part.
     pub fn place(&self, part: usize) -> usize {
         self.places[part] as usize
@@ -168,6 +176,11 @@ impl Comes {
         let hollow = !self.hollow.is_empty();
         let all_done = |endings: &Endings| endings.iter().all(|ending| *ending == Ending::Done);
         endings(&self.can_fail, stop, each).into_iter().filter(move |endings| !hollow || !all_done(endings))
+    }
+
+    /// Whether a push is refused because the stack is full.
+    pub fn lacks_room(&self) -> bool {
+        self.refused.iter().any(|(_, why)| why.iter().any(|finding| finding.code == STACK_FULL))
     }
 
     /// So many requests are settled then.

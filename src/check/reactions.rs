@@ -53,7 +53,8 @@ const FIRST_ENTRY: u32 = u32::MAX;
 pub struct Reactions<'a> {
     deployment: &'a Deployment,
     chart: &'a Chart,
-    machine: Machine,
+    /// Made once, and placed where it is wanted.
+    machine: Option<Machine>,
     table: FxHashMap<(NodeId, EventId), Rc<Macrostep>>,
     offers: FxHashMap<NodeId, Rc<Vec<EventId>>>,
     outside: Vec<EventId>,
@@ -74,7 +75,7 @@ impl<'a> Reactions<'a> {
         Self {
             deployment,
             chart,
-            machine: Machine::new(chart),
+            machine: None,
             table: FxHashMap::default(),
             offers: FxHashMap::default(),
             outside: outside.iter().map(|e| chart.event(*e)).collect(),
@@ -112,14 +113,14 @@ impl<'a> Reactions<'a> {
         if let Some(known) = self.table.get(&(leaf, event)) {
             return known.clone();
         }
-        let mut machine = std::mem::replace(&mut self.machine, Machine::new(self.chart));
+        let mut machine = self.machine.take().unwrap_or_else(|| Machine::new(self.chart));
         let mut hook = self.watch(Some(leaf));
         machine.place(self.chart, leaf, Time::default());
         machine.send(event);
         machine.run(self.chart, Time::default(), &mut hook);
         let number = u32::try_from(self.table.len()).unwrap_or(FIRST_ENTRY);
         let reaction = Rc::new(hook.reaction(machine.leaf().unwrap_or(leaf), number));
-        self.machine = machine;
+        self.machine = Some(machine);
         self.table.insert((leaf, event), reaction.clone());
         reaction
     }

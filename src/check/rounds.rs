@@ -137,9 +137,9 @@ impl Graph<'_, '_> {
     /// False: it cannot be gone by what its requests come to alone.
     fn round_and_round(&mut self, cycle: &[u32], worst: Failed) -> bool {
         let Some(first) = cycle.first().map(|edge| self.edges[*edge as usize]) else { return false };
-        let Some(mut world) = self.product.worlds.get(self.states[first.from as usize].world).cloned() else {
-            return false;
-        };
+        let begun = self.states[first.from as usize].world;
+        let Some(mut world) = self.product.worlds.get(begun).cloned() else { return false };
+        let mut system = self.product.worlds.system(begun);
         let mut requests: Vec<(Edge, Vec<Request>)> = Vec::new();
         for number in cycle {
             let edge = self.edges[*number as usize];
@@ -154,13 +154,13 @@ impl Graph<'_, '_> {
         'round: for round in 0..limit + 2 {
             let frames = world.stack.len();
             for (edge, requests) in &requests {
-                if !self.product.worlds.carry_out(&mut world, requests) {
+                if !self.product.worlds.carry_on(&mut world, &mut system, requests) {
                     at = edge.from;
                     break 'round;
                 }
                 // What fails may leave something else than nothing done.
                 if round == 0 && worst != Failed::Nothing && !squashed(&world) {
-                    let met = self.product.worlds.met(world.clone());
+                    let met = self.product.worlds.intern(world.clone(), system);
                     if met != self.states[edge.to as usize].world {
                         return false;
                     }
@@ -172,7 +172,7 @@ impl Graph<'_, '_> {
             }
         }
         let mut state = self.states[at as usize].clone();
-        let world = self.product.worlds.met(world);
+        let world = self.product.worlds.intern(world, system);
         if world == state.world {
             return true;
         }

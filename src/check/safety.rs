@@ -3,6 +3,7 @@
 use super::coordinator::outside_events;
 use super::explore::Graph;
 use super::judge::Traced;
+use super::met::MetStates;
 use super::product::Product;
 use super::state::{Failed, Move, Next, ProductState};
 use crate::limits;
@@ -11,6 +12,7 @@ use crate::model::finding::{count, did_you_mean};
 use crate::model::{Ask, Deployment, EventName, Finding, Findings, Origin, Severity};
 use crate::statechart::{Chart, EventId, NodeId};
 use rustc_hash::{FxHashMap, FxHashSet};
+use smallvec::SmallVec;
 use std::collections::BTreeSet;
 
 /// Events that no coordinator listens to.
@@ -43,10 +45,10 @@ impl Graph<'_, '_> {
         let events: Vec<_> = self.product.deployment.safety.clone();
         let order = self.in_order();
         // Where nothing comes from outside, it does not matter what came first.
-        let mut good: FxHashSet<ProductState> = FxHashSet::default();
+        let mut good = GoodStates::default();
         let mut alike: FxHashMap<usize, (Vec<u32>, Vec<String>)> = FxHashMap::default();
         for (event, origin) in events {
-            let mut known: FxHashSet<(Vec<NodeId>, u32)> = FxHashSet::default();
+            let mut known: FxHashSet<(SmallVec<[NodeId; 2]>, u32)> = FxHashSet::default();
             let class =
                 self.product.outside.iter().position(|outside| *outside == event).map(|at| self.product.alike[at]);
             let said = class.and_then(|class| alike.get(&class).cloned());
@@ -57,16 +59,15 @@ impl Graph<'_, '_> {
                 if !settled || !self.product.worlds.has_actuator(world) || self.product.is_down(state) {
                     continue;
                 }
-                let state = state.clone();
                 // In one place and one world, with nothing under way, it leads to one thing.
-                if state.desk.is_empty() && !known.insert((state.leaves.to_vec(), world)) {
+                if state.desk.is_empty() && !known.insert((state.leaves.clone(), world)) {
                     continue;
                 }
-                if leads_elsewhere(self.product, &state, event, &mut good).is_none() {
+                if leads_elsewhere((self.product, &self.states), state, event, &mut good).is_none() {
                     continue;
                 }
                 bad.push(*at);
-                let place = format!("`{}`", self.product.place(&state));
+                let place = format!("`{}`", self.product.place(state));
                 if !places.contains(&place) {
                     places.push(place);
                 }
@@ -90,7 +91,7 @@ impl Graph<'_, '_> {
                  outermost state in which actuators exist serves for all inside"
             ));
             let state = self.states[at as usize].clone();
-            let on = leads_elsewhere(self.product, &state, event, &mut good).unwrap_or_default();
+            let on = leads_elsewhere((self.product, &self.states), &state, event, &mut good).unwrap_or_default();
             let trace = self.trace_on(at, on);
             found.push((finding, trace));
         }
@@ -109,10 +110,10 @@ fn is_asked(product: &Product<'_>, state: &ProductState) -> bool {
 /// A way on which `event` does not lead to a safe configuration from this state, though nothing else comes from outside; none:
 /// on each it does. `good` are states from which every such way does.
 fn leads_elsewhere(
-    product: &mut Product<'_>,
+    (product, met): (&mut Product<'_>, &MetStates),
     state: &ProductState,
     event: EventName,
-    good: &mut FxHashSet<ProductState>,
+    good: &mut GoodStates,
 ) -> Option<Vec<(ProductState, Next)>> {
     if is_asked(product, state) {
         return None;
@@ -126,7 +127,7 @@ fn leads_elsewhere(
     }
     // What nobody waits for anywhere is no move.
     let at = product.outside.iter().position(|name| *name == event).and_then(|at| u16::try_from(at).ok());
-    let mut walk = Walk { good, begins: usize::from(at.is_some()), way: Vec::new() };
+    let mut walk = Walk { met, good, begins: usize::from(at.is_some()), way: Vec::new() };
     for after in after {
         let begins = at.map(|at| (state.clone(), Next::plain(Move::Event(at), after.clone(), Failed::Nothing)));
         walk.way.extend(begins);
@@ -138,9 +139,30 @@ fn leads_elsewhere(
     None
 }
 
+/// States from which every way leads to a safe configuration where nothing comes from outside: most of them were met.
+#[derive(Default)]
+struct GoodStates {
+    numbers: FxHashSet<u32>,
+    others: FxHashSet<ProductState>,
+}
+
+impl GoodStates {
+    fn contains(&self, met: &MetStates, state: &ProductState) -> bool {
+        met.find(state).map_or_else(|| self.others.contains(state), |number| self.numbers.contains(&number))
+    }
+
+    fn insert(&mut self, met: &MetStates, state: &ProductState) {
+        match met.find(state) {
+            Some(number) => _ = self.numbers.insert(number),
+            None => _ = self.others.insert(state.clone()),
+        }
+    }
+}
+
 /// Ways on which nothing comes from outside.
 struct Walk<'g> {
-    good: &'g mut FxHashSet<ProductState>,
+    met: &'g MetStates,
+    good: &'g mut GoodStates,
     /// So many moves come from outside, at the beginning.
     begins: usize,
     /// The moves so far, each with the state before it.
@@ -150,7 +172,7 @@ struct Walk<'g> {
 impl Walk<'_> {
     /// Whether every way from here comes to a safe configuration; else `way` is one that does not.
     fn leads(&mut self, product: &mut Product<'_>, state: &ProductState) -> bool {
-        if is_asked(product, state) || self.good.contains(state) {
+        if is_asked(product, state) || self.good.contains(self.met, state) {
             return true;
         }
         // Round and round, or too far to be an answer to an emergency.
@@ -170,7 +192,7 @@ impl Walk<'_> {
             }
             self.way.pop();
         }
-        self.good.insert(state.clone());
+        self.good.insert(self.met, state);
         true
     }
 }

@@ -2,6 +2,7 @@
 
 use super::equivalence::{FrameBook, FrameNumber};
 use super::frame_orders::{Noted, Orders};
+use super::other_frames::{ListNumber, NOBODY, OtherFrames};
 use crate::limits;
 use crate::model::ConfigId;
 use crate::stack::{Frame, FrameId, Requester, Stack, calls, is_kept, staying};
@@ -53,6 +54,9 @@ pub struct Shapes {
     beneath: FxHashMap<Beneath, u32>,
     /// Of a frame (its content) among those frames that do not count and that it has to do with, so many of which lie below it.
     under: FxHashMap<(FrameNumber, SmallVec<[FrameNumber; 4]>, usize), u32>,
+    /// The same by all that do not count and lie below it, and above it.
+    between: FxHashMap<(FrameNumber, ListNumber, ListNumber), u32>,
+    others: OtherFrames,
     /// Of stacks that were met, by what their frames contain.
     known: FxHashMap<Box<[FrameNumber]>, Rc<StackShape>>,
     /// Of frames that were met, by their numbers.
@@ -153,30 +157,25 @@ impl Shapes {
         let facts: SmallVec<[FrameFacts; 64]> =
             frames.iter().zip(numbers).map(|(frame, number)| self.facts(frame, *number)).collect();
         self.orders.note(frames.iter().zip(&facts).map(|(frame, facts)| (frame.requester, facts.noted)));
-        let others: SmallVec<[usize; 64]> = (0..frames.len()).filter(|at| !facts[*at].noted.counts).collect();
-        let mut kept: Vec<CountedFrame<'_>> = Vec::with_capacity(frames.len() - others.len());
-        for (place, frame) in frames.iter().enumerate().filter(|(place, _)| facts[*place].noted.counts) {
-            let (lower, upper) = others.split_at(place - kept.len());
-            // Those below matter only to what it has called, and only safe ones.
-            let lower = lower.iter().filter(|at| facts[place].calls && frames[**at].safe);
-            let mut lower: SmallVec<[usize; 4]> = lower.copied().collect();
-            let meets = |at: &&usize| self.frames.meet((frame, numbers[place]), (&frames[**at], numbers[**at]));
-            let mut upper: SmallVec<[usize; 4]> = upper.iter().filter(meets).copied().collect();
-            // Which comes first, and how often, matters only to who takes connections of other files away.
-            for list in [&mut lower, &mut upper].into_iter().filter(|_| self.one_file) {
-                list.sort_unstable_by_key(|at| numbers[*at]);
-                list.dedup_by_key(|at| numbers[*at]);
+        let above = self.others_above(numbers, &facts);
+        let mut kept: Vec<CountedFrame<'_>> = Vec::with_capacity(frames.len());
+        let mut below = NOBODY;
+        for (place, frame) in frames.iter().enumerate() {
+            let (number, own) = (numbers[place], facts[place]);
+            if !own.noted.counts {
+                // Those below matter only to what it has called, and only safe ones.
+                if frame.safe {
+                    below = self.others.with(below, number, self.one_file);
+                }
+                continue;
             }
-            let those = lower.iter().chain(&upper);
-            let key = (numbers[place], those.clone().map(|at| numbers[*at]).collect(), lower.len());
-            let under = self.under.get(&key).copied().unwrap_or_else(|| {
-                let next = u32::try_from(self.beneath.len()).unwrap_or(u32::MAX);
-                let those: Vec<Arc<Frame>> = those.map(|at| frames[*at].clone()).collect();
-                let under = *self.beneath.entry(beneath(frame, &those, lower.len())).or_insert(next);
-                self.under.insert(key, under);
+            let key = (number, if own.calls { below } else { NOBODY }, above[place]);
+            let under = self.between.get(&key).copied().unwrap_or_else(|| {
+                let under = self.under(frames, numbers, &facts, place);
+                self.between.insert(key, under);
                 under
             });
-            kept.push(CountedFrame { frame, place, rank: facts[place].rank, counted: (numbers[place], under) });
+            kept.push(CountedFrame { frame, place, rank: own.rank, counted: (number, under) });
         }
         let order = self.canonical(stack, &kept);
         let counted = order.iter().map(|at| kept[*at].counted).collect();
@@ -184,6 +183,43 @@ impl Shapes {
         let own = frames.iter().zip(&facts).filter(|(_, facts)| facts.noted.counts).map(|(frame, _)| frame);
         let [deep, left] = more_than([limits::CHECK_FRAMES, limits::CHECK_LEFT], own);
         StackShape { counted, places, deep, left }
+    }
+
+    /// Of each frame which of those above it do not count.
+    fn others_above(&mut self, numbers: &[FrameNumber], facts: &[FrameFacts]) -> SmallVec<[ListNumber; 64]> {
+        let mut above = SmallVec::from_elem(NOBODY, numbers.len());
+        let mut list = NOBODY;
+        for (place, number) in numbers.iter().enumerate().rev() {
+            above[place] = list;
+            if !facts[place].noted.counts {
+                list = self.others.with(list, *number, self.one_file);
+            }
+        }
+        above
+    }
+
+    /// The number of what frames that do not count do to one that does.
+    fn under(&mut self, frames: &[Arc<Frame>], numbers: &[FrameNumber], facts: &[FrameFacts], place: usize) -> u32 {
+        let frame = &frames[place];
+        let other = |at: &usize| !facts[*at].noted.counts;
+        let lower = (0..place).filter(|at| other(at) && facts[place].calls && frames[*at].safe);
+        let mut lower: SmallVec<[usize; 4]> = lower.collect();
+        let meets = |at: &usize| self.frames.meet((frame, numbers[place]), (&frames[*at], numbers[*at]));
+        let mut upper: SmallVec<[usize; 4]> = (place + 1..frames.len()).filter(other).filter(meets).collect();
+        // Which comes first, and how often, matters only to who takes connections of other files away.
+        for list in [&mut lower, &mut upper].into_iter().filter(|_| self.one_file) {
+            list.sort_unstable_by_key(|at| numbers[*at]);
+            list.dedup_by_key(|at| numbers[*at]);
+        }
+        let those = lower.iter().chain(&upper);
+        let key = (numbers[place], those.clone().map(|at| numbers[*at]).collect(), lower.len());
+        self.under.get(&key).copied().unwrap_or_else(|| {
+            let next = u32::try_from(self.beneath.len()).unwrap_or(u32::MAX);
+            let those: Vec<Arc<Frame>> = those.map(|at| frames[*at].clone()).collect();
+            let under = *self.beneath.entry(beneath(frame, &those, lower.len())).or_insert(next);
+            self.under.insert(key, under);
+            under
+        })
     }
 
     /// The order in which frames that count are taken: of those that could as well lie at the bottom, always that with the least name.
@@ -202,6 +238,7 @@ impl Shapes {
             });
             one.1
         };
+        let alone = kept.iter().all(|frame| frame.frame.requester == kept[0].frame.requester);
         // Of each how many have to go first, and which it keeps waiting.
         let mut waits: Vec<usize> = vec![0; kept.len()];
         let mut behind: Vec<SmallVec<[usize; 2]>> = vec![SmallVec::new(); kept.len()];
@@ -217,6 +254,9 @@ impl Shapes {
                     in_row |= next;
                     waits[other] += 1;
                     behind[at].push(other);
+                    if full && alone {
+                        break;
+                    }
                 }
             }
         }

@@ -27,7 +27,7 @@ pub enum Failed {
 }
 
 /// A state of the product.
-#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+#[derive(Debug, PartialEq, Eq, Hash)]
 pub struct ProductState {
     /// Where each coordinator is.
     pub leaves: SmallVec<[NodeId; 2]>,
@@ -62,6 +62,22 @@ pub struct ProductState {
     pub beliefs: SharedList<u32>,
     /// What was told its parent since the last move, and what was raised for a subsystem in vain; empty in a state between moves.
     pub told: SharedList<EventName>,
+}
+
+impl Clone for ProductState {
+    /// There are a dozen copies for each state that is met: where the coordinators are is copied as bytes.
+    fn clone(&self) -> Self {
+        Self {
+            leaves: SmallVec::from_slice(&self.leaves),
+            desk: self.desk.clone(),
+            inbox: self.inbox.clone(),
+            stands: self.stands.clone(),
+            seldom: self.seldom.clone(),
+            beliefs: self.beliefs.clone(),
+            told: self.told.clone(),
+            ..*self
+        }
+    }
 }
 
 impl Deref for ProductState {
@@ -199,6 +215,15 @@ pub type States = SmallVec<[ProductState; 1]>;
 /// One of them.
 pub fn one(state: ProductState) -> States {
     SmallVec::from_buf([state])
+}
+
+/// These as well. Mostly they are the first.
+pub fn add(all: &mut States, more: States) {
+    if all.is_empty() {
+        *all = more;
+    } else {
+        all.extend(more);
+    }
 }
 
 /// A state that follows.

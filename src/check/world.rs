@@ -272,6 +272,23 @@ impl<'a> Worlds<'a> {
         true
     }
 
+    /// The same in a world whose system has that number: it has another one then. What pushes come to is known from elsewhere.
+    pub(super) fn carry_on(&mut self, world: &mut World, system: &mut SystemId, requests: &[Request]) -> bool {
+        let mut rest = requests;
+        while !rest.is_empty() {
+            let group = take_up(world, rest, &Rules { pushes: Some(self.pushes.of(*system)), ..self.rules() });
+            if group.told.iter().any(|told| told.reason.is_some()) {
+                return false;
+            }
+            if let Some(planned) = &group.planned {
+                *system = self.systems.carry_out(*system, &mut world.system, &planned.steps);
+                world.stack.apply(planned.parts.iter().map(|part| &part.edits), &[]);
+            }
+            rest = &rest[group.takes.max(1).min(rest.len())..];
+        }
+        true
+    }
+
     /// The number of a world of the caller's own.
     pub fn met(&mut self, mut world: World) -> WorldId {
         let system = self.systems.number(&mut world.system);

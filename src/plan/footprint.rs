@@ -49,6 +49,8 @@ impl Index {
     /// The touches of `footprint` that `keep` keeps.
     pub fn new(footprint: &Footprint, keep: impl Fn(&Touch) -> bool) -> Self {
         let mut index = Self::default();
+        // Most slots are touched once.
+        index.slots.reserve(footprint.touches.len());
         for touch in footprint.touches.iter().filter(|t| keep(t)) {
             // A need and a join of one slot disturb whatever a write would.
             let strongest = |now: Access| if now == touch.access { now } else { Access::Write };

@@ -96,7 +96,7 @@ fn piecewise(
         footprint: Arc::new(footprint),
         saved,
         floor: crate::plan::irreversible(&steps).map(str::to_owned),
-        parts: std::collections::BTreeSet::new(),
+        parts: Arc::default(),
         scope: request.scope,
         partial: !troubles.is_empty(),
         safe: true,

@@ -102,7 +102,7 @@ pub struct Frame {
     /// Why undo does not pass it, if it does not.
     pub floor: Option<String>,
     /// What was squashed into it; empty for a frame of its own.
-    pub parts: BTreeSet<Buried>,
+    pub parts: Arc<BTreeSet<Buried>>,
     /// The state of its coordinator that it belongs to, while that is active: such a frame is never squashed.
     pub scope: Option<Scope>,
     /// It is what was done and not taken back of something that ended *broken*.
@@ -210,14 +210,20 @@ impl Stack {
         &self.frames
     }
 
-    /// Takes the same frames from elsewhere: who keeps thousands of stacks has each once.
-    pub fn share(&mut self, same: impl FnMut(&Arc<Frame>) -> Arc<Frame>) {
-        self.frames = self.frames.iter().map(same).collect();
+    /// Takes the same frames from elsewhere, where there are others: who keeps thousands of stacks has each once.
+    pub fn share(&mut self, mut same: impl FnMut(&Arc<Frame>) -> Option<Arc<Frame>>) {
+        for frame in &mut self.frames {
+            if let Some(other) = same(frame) {
+                *frame = other;
+            }
+        }
+        self.frames.shrink_to_fit();
     }
 
     /// Whether so many more frames of a requester are within its bound.
     pub fn has_room(&self, by: Requester, more: usize) -> bool {
-        self.frames.iter().filter(|frame| frame.requester == by).count() + more <= self.bound
+        self.frames.len() + more <= self.bound
+            || self.frames.iter().filter(|frame| frame.requester == by).count() + more <= self.bound
     }
 
     /// How many frames there are.

@@ -141,6 +141,11 @@ pub(super) fn examine(frames: &[Arc<Frame>], at: usize) -> Result<HandOver, Box<
     look(frames, at).map_err(|hindrance| Box::new(hindrance.finding))
 }
 
+/// The same, without a word on why not.
+pub(super) fn free(frames: &[Arc<Frame>], at: usize) -> Option<HandOver> {
+    handed(frames, at).ok()
+}
+
 /// What keeps a frame from being popped.
 pub(super) struct Hindrance {
     /// The frame above that shares something with it, the newest of them; none: it is a floor, or one above holds it back.
@@ -151,6 +156,48 @@ pub(super) struct Hindrance {
 
 /// The same, and which frame it is that stands in its way.
 pub(super) fn look(frames: &[Arc<Frame>], at: usize) -> Result<HandOver, Box<Hindrance>> {
+    handed(frames, at).map_err(|obstacle| Box::new(obstacle.told(&frames[at])))
+}
+
+/// What stands in a frame's way.
+enum Obstacle<'f> {
+    /// A floor, for this reason.
+    Floor(&'f str),
+    /// A frame above that touches what it shares.
+    Shared(&'f Frame, &'f Touch),
+}
+
+impl Obstacle<'_> {
+    /// In the way of this frame.
+    fn told(self, frame: &Frame) -> Hindrance {
+        match self {
+            Self::Floor(reason) => {
+                let message = format!("`{}` cannot be undone: {reason}", frame.configuration);
+                let finding = Finding::error(codes::STACK_FLOOR, message)
+                    .help("apply a configuration that leads to the wanted state instead");
+                Hindrance { by: None, finding }
+            }
+            Self::Shared(other, touch) => {
+                let did = match touch.access {
+                    Access::Need => "needs",
+                    Access::Join | Access::Write => "changes",
+                };
+                let (mine, theirs) = (frame.configuration, other.configuration);
+                let whose = if other.requester == frame.requester {
+                    String::new()
+                } else {
+                    format!(" (a frame of {})", other.requester)
+                };
+                let message = format!("`{mine}` cannot be undone before `{theirs}`{whose}, which {did} {}", touch.slot);
+                let finding = Finding::error(codes::STACK_SHARED, message)
+                    .help(format!("undo `{theirs}` first, or undo down to `{mine}`"));
+                Hindrance { by: Some(other.id), finding }
+            }
+        }
+    }
+}
+
+fn handed(frames: &[Arc<Frame>], at: usize) -> Result<HandOver, Obstacle<'_>> {
     let frame = &frames[at];
     if frames[at..].iter().any(|above| above.floor.is_some()) {
         let mine = components(&frame.footprint);
@@ -159,10 +206,7 @@ pub(super) fn look(frames: &[Arc<Frame>], at: usize) -> Result<HandOver, Box<Hin
             if let Some(reason) = &above.floor
                 && (place == 0 || reaches(above, frame) && meet(&mine, &above.footprint))
             {
-                let message = format!("`{}` cannot be undone: {reason}", frame.configuration);
-                let finding = Finding::error(codes::STACK_FLOOR, message)
-                    .help("apply a configuration that leads to the wanted state instead");
-                return Err(Box::new(Hindrance { by: None, finding }));
+                return Err(Obstacle::Floor(reason));
             }
         }
     }
@@ -190,20 +234,7 @@ pub(super) fn look(frames: &[Arc<Frame>], at: usize) -> Result<HandOver, Box<Hin
         let mut touches = other.footprint.touches.iter();
         let shared = touches.find(|touch| index.shares(touch) && !connections.pass(frame, other, touch));
         if let Some(touch) = shared {
-            let did = match touch.access {
-                Access::Need => "needs",
-                Access::Join | Access::Write => "changes",
-            };
-            let (mine, theirs) = (frame.configuration, other.configuration);
-            let whose = if other.requester == frame.requester {
-                String::new()
-            } else {
-                format!(" (a frame of {})", other.requester)
-            };
-            let message = format!("`{mine}` cannot be undone before `{theirs}`{whose}, which {did} {}", touch.slot);
-            let finding = Finding::error(codes::STACK_SHARED, message)
-                .help(format!("undo `{theirs}` first, or undo down to `{mine}`"));
-            return Err(Box::new(Hindrance { by: Some(other.id), finding }));
+            return Err(Obstacle::Shared(other, touch));
         }
     }
     Ok(hand)
@@ -212,7 +243,7 @@ pub(super) fn look(frames: &[Arc<Frame>], at: usize) -> Result<HandOver, Box<Hin
 /// Whether a frame cannot be popped while these lie above it.
 pub fn is_kept(frame: &Arc<Frame>, above: impl Iterator<Item = Arc<Frame>>) -> bool {
     let frames: Vec<Arc<Frame>> = std::iter::once(frame.clone()).chain(above).collect();
-    examine(&frames, 0).is_err()
+    free(&frames, 0).is_none()
 }
 
 /// Gives the values that a popped frame leaves to their takers.

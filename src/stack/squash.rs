@@ -2,13 +2,13 @@
 
 use super::net::reduce;
 use super::share::{self, HandOver};
-use super::{Frame, FrameId, Inverse, Pile};
+use super::{Buried, Frame, FrameId, Inverse, Pile};
 use crate::limits;
 use crate::model::{MemberRef, Step};
 use crate::plan::footprint::{Footprint, Slot, Touch};
 use crate::plan::undo::{DraftStep, absolute, items};
 use crate::system::System;
-use rustc_hash::{FxHashMap, FxHashSet};
+use rustc_hash::{FxBuildHasher, FxHashMap, FxHashSet};
 use smallvec::SmallVec;
 use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -117,7 +117,8 @@ pub(super) fn fits(frames: &[Arc<Frame>], quota: Quota<'_>, memory: Option<&Memo
 
 /// Squashes until a pile has at most `bound` frames. False: no two could be squashed.
 pub(super) fn fit(frames: &mut Vec<Arc<Frame>>, quota: Quota<'_>, memory: Option<&Memory>) -> bool {
-    while quota.own(frames).count() > quota.bound {
+    // Most stacks have fewer frames than one pile may have.
+    while frames.len() > quota.bound && quota.own(frames).count() > quota.bound {
         let Some(Pair { lower, upper, way }) = pair(frames, quota) else { return false };
         let (made, stays, goes) = match (way, memory) {
             (Passage::Up(left, hand), _) => {
@@ -161,12 +162,18 @@ fn pair(frames: &[Arc<Frame>], quota: Quota<'_>) -> Option<Pair> {
 fn among(frames: &[Arc<Frame>], quota: Quota<'_>, may: &dyn Fn(&Frame) -> bool) -> Option<Pair> {
     // A partial frame is undone by its name.
     let free = |f: &Frame| f.scope.is_none() && !f.partial && !quota.busy.contains(&f.id) && may(f);
-    let own: Vec<usize> = quota.own(frames).collect();
+    let own: SmallVec<[usize; 96]> = quota.own(frames).collect();
     let newest = own.last().copied();
-    let pairs = own.windows(2).map(|two| (two[0], two[1])).filter(|(a, b)| free(&frames[*a]) && free(&frames[*b]));
+    let mut lower = own.first().copied().filter(|at| free(&frames[*at]));
+    let mut pairs: SmallVec<[(usize, usize); 96]> = SmallVec::new();
+    for upper in own.iter().skip(1).copied() {
+        let fits = free(&frames[upper]).then_some(upper);
+        pairs.extend(lower.zip(fits));
+        lower = fits;
+    }
     // What lies between is looked at last: that takes longest.
     let first = |fits: &dyn Fn(usize, usize) -> bool| {
-        let mut fitting = pairs.clone().filter(|(a, b)| fits(*a, *b));
+        let mut fitting = pairs.iter().copied().filter(|(a, b)| fits(*a, *b));
         fitting.find_map(|(lower, upper)| Some(Pair { lower, upper, way: way(frames, lower, upper, quota.busy)? }))
     };
     // The newest frame stays by itself as long as there is any other way: it is the one most likely to be undone.
@@ -196,7 +203,7 @@ fn way(frames: &[Arc<Frame>], lower: usize, upper: usize, busy: &[FrameId]) -> O
     if frames[lower + 1..upper].iter().all(|between| !share::shares(&frames[upper], between)) {
         return Some(Passage::Down);
     }
-    let hand = share::examine(&frames[..upper], lower).ok()?;
+    let hand = share::free(&frames[..upper], lower)?;
     let (old, new) = (&frames[lower], &frames[upper]);
     // What a run state serves is not taken apart.
     let again = |slot: Slot| {
@@ -234,31 +241,45 @@ pub(super) fn list(frame: &Frame) -> Vec<DraftStep> {
     }
 }
 
-/// Two neighbours as one frame.
-pub(super) fn squash(lower: &Frame, upper: &Frame) -> Frame {
-    let mut parts: BTreeSet<_> = lower.parts.iter().chain(&upper.parts).copied().collect();
-    for frame in [lower, upper] {
-        if !frame.is_squashed() {
-            parts.insert(frame.buried());
+/// What becomes one frame. Where the upper one adds nothing it is what the lower one has: such frames are kept for long, and by
+/// whoever follows thousands of stacks in great number.
+fn parts(lower: &Frame, upper: &Frame) -> Arc<BTreeSet<Buried>> {
+    let mut parts = lower.parts.clone();
+    let own = [lower, upper].into_iter().filter(|frame| !frame.is_squashed()).map(Frame::buried);
+    for part in upper.parts.iter().copied().chain(own) {
+        if !parts.contains(&part) {
+            Arc::make_mut(&mut parts).insert(part);
         }
     }
-    let mut seen: FxHashSet<(Slot, u8, Option<Slot>)> = FxHashSet::default();
-    let mut touches: Vec<Touch> = lower
-        .footprint
-        .touches
-        .iter()
-        .chain(&upper.footprint.touches)
-        .filter(|t| seen.insert((t.slot, t.access as u8, t.serves)))
-        .copied()
-        .collect();
-    // Such frames are kept for long, and by whoever follows thousands of stacks in great number.
-    touches.shrink_to_fit();
+    parts
+}
+
+/// What both touch, each once.
+fn footprint(lower: &Arc<Footprint>, upper: &Footprint) -> Arc<Footprint> {
+    let most = lower.touches.len() + upper.touches.len();
+    let mut seen: FxHashSet<(Slot, u8, Option<Slot>)> = FxHashSet::with_capacity_and_hasher(most, FxBuildHasher);
+    let mut is_new = |touch: &&Touch| seen.insert((touch.slot, touch.access as u8, touch.serves));
+    let own: Vec<&Touch> = lower.touches.iter().filter(&mut is_new).collect();
+    let more: Vec<&Touch> = upper.touches.iter().filter(is_new).collect();
+    if more.is_empty() && own.len() == lower.touches.len() {
+        return lower.clone();
+    }
+    let mut touches = Vec::with_capacity(own.len() + more.len());
+    touches.extend(own.into_iter().chain(more));
+    Arc::new(Footprint { touches })
+}
+
+/// Two neighbours as one frame.
+pub(super) fn squash(lower: &Frame, upper: &Frame) -> Frame {
+    let parts = parts(lower, upper);
+    let footprint = footprint(&lower.footprint, &upper.footprint);
     let mut slots: FxHashSet<Slot> = FxHashSet::default();
     let saved = lower.saved.iter().chain(&upper.saved).filter(|s| slots.insert(s.slot)).cloned().collect();
     let mut floor = lower.floor.clone().or_else(|| upper.floor.clone());
     let mut inverse = Vec::new();
     if floor.is_none() {
-        let bound: FxHashSet<MemberRef> = touches
+        let bound: FxHashSet<MemberRef> = footprint
+            .touches
             .iter()
             .filter_map(|t| match (t.slot, t.serves) {
                 (Slot::State(_), Some(Slot::Property(property))) => Some(property),
@@ -283,8 +304,12 @@ pub(super) fn squash(lower: &Frame, upper: &Frame) -> Frame {
         group: None,
         requester: upper.requester,
         at: upper.at,
-        inverse: Inverse::List(Arc::new(inverse)),
-        footprint: Arc::new(Footprint { touches }),
+        // Going round and round leads back to where it began.
+        inverse: match &lower.inverse {
+            Inverse::List(list) if **list == inverse => Inverse::List(list.clone()),
+            _ => Inverse::List(Arc::new(inverse)),
+        },
+        footprint,
         saved,
         floor,
         parts,

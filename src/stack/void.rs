@@ -8,6 +8,7 @@ use crate::plan::undo::{DraftStep, absolute};
 use crate::plan::{PlannedStep, SavedValue};
 use crate::system::touch::components;
 use rustc_hash::FxHashSet;
+use smallvec::SmallVec;
 use std::sync::Arc;
 
 /// Which connections foreign frames have made and no newer one has taken away: asked of the frames above one, the newest first.
@@ -70,6 +71,26 @@ pub(super) fn is_foreign(frame: &Frame, component: ComponentName) -> bool {
         a == component || b == component
     };
     !frame.is_of_file(component.prefix()) && frame.footprint.touches.iter().any(about)
+}
+
+/// Those of these components that frames of other files are about.
+pub(super) fn touched_from_outside(
+    frames: &[Arc<Frame>],
+    components: impl Iterator<Item = ComponentName>,
+) -> Vec<ComponentName> {
+    // Of each file whether a frame is of another one: mostly there is one file, and none is.
+    let mut files: SmallVec<[(&str, bool); 1]> = SmallVec::new();
+    let touched = |of: &ComponentName| -> bool {
+        let path = of.prefix();
+        let known = files.iter().find(|(other, _)| *other == path).map(|(_, has)| *has);
+        let has_foreign = known.unwrap_or_else(|| {
+            let has = frames.iter().any(|frame| !frame.is_of_file(path));
+            files.push((path, has));
+            has
+        });
+        has_foreign && frames.iter().any(|frame| is_foreign(frame, *of))
+    };
+    components.filter(touched).collect()
 }
 
 /// The components of its own file that a frame makes or takes away.

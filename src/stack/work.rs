@@ -315,8 +315,7 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
 
     /// Their own file takes components away: what frames of others did to them is void from now on.
     fn is_taken_away(&mut self, gone: impl Iterator<Item = ComponentName>, edits: &mut Edits) {
-        let matters = |of: &ComponentName| self.frames.iter().any(|frame| void::is_foreign(frame, *of));
-        let mut gone: Vec<ComponentName> = gone.filter(matters).collect();
+        let mut gone: Vec<ComponentName> = void::touched_from_outside(&self.frames, gone);
         if !gone.is_empty() {
             gone.sort_unstable();
             void::take_out(&mut self.frames, &|frame, of| gone.contains(&of) && void::is_foreign(frame, of));
@@ -392,7 +391,7 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
             footprint: footprint.clone(),
             saved: saved.clone(),
             floor: floor.clone(),
-            parts: std::collections::BTreeSet::new(),
+            parts: Arc::default(),
             scope,
             partial: false,
             safe: configuration.safe,
@@ -429,7 +428,7 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
             self.replaced = true;
             return self.pop(at, Some(configuration), edits).map_err(|refusal| refused(refusal.findings, old.as_str()));
         }
-        let buried = self.frames.iter().flat_map(|f| &f.parts).find(|p| p.group == Some(group));
+        let buried = self.frames.iter().flat_map(|f| f.parts.iter()).find(|p| p.group == Some(group));
         if let Some(part) = buried {
             let message = format!("`{}` was squashed together with other frames", part.configuration);
             let cause = Finding::error(codes::STACK_SQUASHED, message).help("undo down to the squashed frame");

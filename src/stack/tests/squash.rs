@@ -195,7 +195,7 @@ fn what_differs_in_numbers_alone_is_squashed_once() {
     let mut next = 100;
     other.share(|frame| {
         next += 1;
-        Arc::new(super::super::Frame { id: FrameId(next), ..(**frame).clone() })
+        Some(Arc::new(super::super::Frame { id: FrameId(next), ..(**frame).clone() }))
     });
     let third = of(3);
     let planned = bench.ask(&[push(&third)]).expect("it fits");
@@ -205,4 +205,22 @@ fn what_differs_in_numbers_alone_is_squashed_once() {
     assert!(a.is_squashed() && a.id != b.id && b.id == FrameId(102), "{:?} {:?}", a.id, b.id);
     assert!(Arc::ptr_eq(&a.footprint, &b.footprint));
     assert_eq!(super::super::Frame { id: a.id, ..(**b).clone() }, **a);
+}
+
+/// Whoever goes round and round has once what all of it touches, and of what it was made.
+#[test]
+fn what_adds_nothing_shares_what_is_there() {
+    let mut bench = Bench::new(2);
+    let of = |n: usize| conf(&format!("c{n}"), None, &[], vec![set("A.gain", n as f64)], &[]);
+    let mut bottom = Vec::new();
+    for n in [1, 2, 1, 2, 1] {
+        bench.ok(&[push(&of(n))]);
+        bottom.push(bench.stack.frames()[0].clone());
+    }
+    let [.., before, after] = &bottom[..] else { unreachable!("five were pushed") };
+    assert!(before.is_squashed() && before.id != after.id);
+    assert!(Arc::ptr_eq(&before.footprint, &after.footprint) && Arc::ptr_eq(&before.parts, &after.parts));
+    bench.ok(&[push(&conf("more", None, &[], vec![set("B.gain", 1.0)], &[])), push(&of(1))]);
+    let more = &bench.stack.frames()[0];
+    assert!(more.footprint.touches.len() > after.footprint.touches.len() && more.parts.len() > after.parts.len());
 }
