@@ -35,7 +35,7 @@ impl EdgeId {
 
 /// An event as a chart knows it: dense for those that some transition lists, one common id for all others from outside,
 /// and one for each completion that no transition lists.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
 pub struct EventId(pub(super) u32);
 
 impl EventId {
@@ -197,7 +197,7 @@ pub struct RaiseSite {
 }
 
 /// A compiled statechart.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Chart {
     pub(super) nodes: Vec<NodeRow>,
     pub(super) edges: Vec<EdgeRow>,
