@@ -5,6 +5,7 @@ use super::wide::Wide;
 use crate::model::finding::Origin;
 use crate::model::names::{EventName, Ident};
 use crate::model::statechart::FunctionId;
+use crate::model::words::words;
 use rustc_hash::FxHashMap;
 use std::fmt;
 
@@ -74,15 +75,17 @@ impl EventId {
     }
 }
 
-/// What a node is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum NodeKind {
-    /// A state without child nodes.
-    Leaf,
-    /// A state with child nodes.
-    Composite,
-    /// A connector.
-    Connector,
+words! {
+    /// What a node is.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+    pub enum NodeKind by word {
+        /// A state without child nodes.
+        Leaf = "leaf",
+        /// A state with child nodes.
+        Composite = "composite",
+        /// A connector.
+        Connector = "connector",
+    }
 }
 
 /// A piece `start..start + len` of another table.

@@ -6,6 +6,7 @@ use super::trace::Trace;
 use super::{EdgeId, EventId};
 use crate::model::names::EventName;
 use crate::model::statechart::FunctionId;
+use crate::model::words::words;
 use std::sync::Arc;
 
 /// A name raised by an entry, an exit or an effect.
@@ -199,17 +200,19 @@ pub struct FunctionOutput {
     pub text: String,
 }
 
-/// rFSM's four printers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Printer {
-    /// Errors, among them those that functions raise.
-    Err,
-    /// Warnings.
-    Warn,
-    /// All else.
-    Info,
-    /// For those who look for a fault.
-    Dbg,
+words! {
+    /// rFSM's four printers.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+    pub enum Printer by word {
+        /// Errors, among them those that functions raise.
+        Err = "err",
+        /// Warnings.
+        Warn = "warn",
+        /// All else.
+        Info = "info",
+        /// For those who look for a fault.
+        Dbg = "dbg",
+    }
 }
 
 /// Functions with somebody who watches: `watcher` sees what happens, `functions` decide and act.
