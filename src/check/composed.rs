@@ -13,7 +13,7 @@ use super::simulated;
 use super::trace::{Does, TraceStep};
 use super::universe::Universe;
 use super::verdict::CheckVerdict;
-use crate::model::subsystem::ExportKind;
+use crate::model::MemberClass;
 use crate::model::{
     Catalogue, Change, ChangeKind, ComponentName, ComponentType, ConfigId, Configuration, Deployment, Finding, Ident,
     StateEntry, StateList, Subsystem, Target, Value, ValueType, Wanted,
@@ -156,8 +156,8 @@ fn exported(subsystem: &Subsystem, catalogue: &Catalogue) -> BTreeMap<ComponentN
             ty
         });
         match export.kind {
-            ExportKind::Port => ty.ports.extend(whole.ports.get_key_value(&export.of.member).map(own)),
-            ExportKind::Property => {
+            MemberClass::Port => ty.ports.extend(whole.ports.get_key_value(&export.of.member).map(own)),
+            MemberClass::Property => {
                 ty.properties.extend(whole.properties.get_key_value(&export.of.member).map(own).map(
                     |(name, mut of)| {
                         of.default = of.default.clone().or_else(|| Some(some_value(&of.ty)));
@@ -165,7 +165,7 @@ fn exported(subsystem: &Subsystem, catalogue: &Catalogue) -> BTreeMap<ComponentN
                     },
                 ));
             }
-            ExportKind::Operation => {
+            MemberClass::Operation => {
                 ty.operations.extend(whole.operations.get_key_value(&export.of.member).map(own));
             }
         }

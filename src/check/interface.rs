@@ -4,13 +4,12 @@ use super::let_go;
 use super::universe::Universe;
 use crate::model::codes::{COMPOSE_EXPORT_DRIVEN, COMPOSE_SAFETY, COMPOSE_UNKNOWN, COMPOSE_WORD};
 use crate::model::finding::did_you_mean;
-use crate::model::subsystem::{ExportKind, IGNORED};
+use crate::model::subsystem::IGNORED;
 use crate::model::{
     Catalogue, ChangeKind, Deployment, Direction, EventName, Finding, Findings, Ident, Origin, Subsystem,
     SubsystemStanding,
 };
 use crate::statechart::{Chart, EventId};
-use crate::system::MemberClass;
 use std::collections::BTreeSet;
 
 /// What is wrong with what it shows.
@@ -29,18 +28,13 @@ fn exports(deployment: &Deployment, universe: &Universe, findings: &mut Findings
         if passed_on && universe.of(of.component).is_empty() {
             continue;
         }
-        let what = match export.kind {
-            ExportKind::Port => MemberClass::Port,
-            ExportKind::Property => MemberClass::Property,
-            ExportKind::Operation => MemberClass::Operation,
-        };
-        let path = format!("exports.{}.{name}", export.kind.key());
+        let path = format!("exports.{}.{name}", export.kind.several());
         if universe.of(of.component).is_empty() {
             let unknown = universe.unknown(of.component, export.origin);
             findings.push(Finding { code: COMPOSE_UNKNOWN, ..unknown }.path(path));
             continue;
         }
-        if let Some(lacks) = universe.lacks(what, of, export.origin) {
+        if let Some(lacks) = universe.lacks(export.kind, of, export.origin) {
             findings.push(Finding { code: COMPOSE_UNKNOWN, ..lacks }.path(path));
             continue;
         }
@@ -76,7 +70,7 @@ fn events(deployment: &Deployment, charts: &[&Chart], findings: &mut Findings) {
         .collect();
     for (event, origin) in deployment.emits.iter().chain(&interface.accepts) {
         let text = event.as_str();
-        if SubsystemStanding::ALL.iter().any(|word| word.word() == text) || text.ends_with(IGNORED) {
+        if SubsystemStanding::WORDS.iter().any(|(word, _)| *word == text) || text.ends_with(IGNORED) {
             let message = format!("`{event}` is told of every subsystem by itself");
             findings.push(Finding::error(COMPOSE_WORD, message).at(*origin).help("give the event another name"));
         }
@@ -112,7 +106,7 @@ pub fn told_by(subsystem: &Subsystem) -> BTreeSet<EventName> {
     let ignored = accepts.filter_map(|event| EventName::new(&format!("{event}{IGNORED}")).ok());
     let emits = own.emits.iter().map(|(event, _)| *event);
     let told = emits.chain(ignored).map(|event| event.within(subsystem.name));
-    told.chain(SubsystemStanding::ALL.map(|word| word.event(subsystem.name))).collect()
+    told.chain(SubsystemStanding::WORDS.iter().map(|(_, standing)| standing.event(subsystem.name))).collect()
 }
 
 /// What is wrong between a deployment and its subsystems. `own` is what stands in its own file.

@@ -141,7 +141,7 @@ impl Universe {
     /// is unknown, which is said where it is created.
     pub fn lacks(&self, what: MemberClass, member: MemberRef, at: Origin) -> Option<Finding> {
         let creations = self.of(member.component);
-        let has = |c: &Creation| c.description.as_ref().is_none_or(|ty| what.is_in(ty, member.member));
+        let has = |c: &Creation| c.description.as_ref().is_none_or(|ty| what.of(ty).contains(&member.member.as_str()));
         if creations.iter().any(has) {
             return None;
         }

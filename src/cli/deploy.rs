@@ -235,20 +235,16 @@ fn watch(
 
 /// Signals cannot be watched.
 pub(super) fn unwatched(error: std::io::Error) -> CommandFailure {
-    CommandFailure::usage(
-        CLI_SYSTEM,
-        format!("signals cannot be watched: {error}"),
-        "try again; the system is short of threads",
-    )
+    no_threads("signals cannot be watched", &error)
 }
 
 /// The system has no thread left.
 pub(super) fn short(error: std::io::Error) -> CommandFailure {
-    CommandFailure::usage(
-        CLI_SYSTEM,
-        format!("no thread can be started: {error}"),
-        "try again; the system is short of threads",
-    )
+    no_threads("no thread can be started", &error)
+}
+
+fn no_threads(what: &str, error: &std::io::Error) -> CommandFailure {
+    CommandFailure::usage(CLI_SYSTEM, format!("{what}: {error}"), "try again; the system is short of threads")
 }
 
 fn tell_up(out: &Output, progress: &ProgressView, session: &Session, in_background: bool) {

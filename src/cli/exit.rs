@@ -8,30 +8,18 @@ use std::process::ExitCode;
 #[must_use]
 pub enum Exit {
     /// Done, or the answer is yes.
-    Done,
+    Done = 0,
     /// The answer is no: findings, failed and rolled back.
-    No,
+    No = 1,
     /// Usage, or input that cannot be read: a missing file, text that does not parse.
-    Usage,
+    Usage = 2,
     /// The system is broken: it is neither as before nor as wanted.
-    Broken,
+    Broken = 3,
     /// It was shut down otherwise than in order: without the coordinator, by force, or incompletely.
-    Forced,
+    Forced = 4,
 }
 
 impl Exit {
-    /// [`Exit::Done`]
-    pub const DONE: u8 = 0;
-    /// [`Exit::No`]
-    pub const NO: u8 = 1;
-    /// [`Exit::Usage`]
-    pub const USAGE: u8 = 2;
-    /// [`Exit::Broken`]
-    pub const BROKEN: u8 = 3;
-
-    /// [`Exit::Forced`]
-    pub const FORCED: u8 = 4;
-
     /// How a command ends whose deployment was stopped so, and that would have ended with `well` had that gone in order.
     pub fn of_stop(ended: &Ended, well: Self) -> Self {
         if ended.is_orderly() { well } else { Self::Forced }
@@ -46,13 +34,7 @@ impl Exit {
 
     /// The number.
     pub fn code(self) -> u8 {
-        match self {
-            Self::Done => Self::DONE,
-            Self::No => Self::NO,
-            Self::Usage => Self::USAGE,
-            Self::Broken => Self::BROKEN,
-            Self::Forced => Self::FORCED,
-        }
+        self as u8
     }
 }
 

@@ -2,8 +2,8 @@
 
 use super::exit::Exit;
 use super::output::Style;
-use super::remote::{Patience, WITHIN, WaitFor, Which, ask, seconds};
-use super::request::request;
+use super::remote::{Patience, WITHIN, Which, ask, seconds};
+use super::request::Asking;
 use super::status::text;
 use super::{CommandContext, CommandResult, Run};
 use serde_json::{Value as Json, json};
@@ -74,22 +74,17 @@ pub struct SetArgs {
     #[arg(long)]
     force: bool,
     #[command(flatten)]
-    which: Which,
-    #[command(flatten)]
-    wait: WaitFor,
-    /// Print JSON.
-    #[arg(long)]
-    json: bool,
+    asking: Asking,
 }
 
 impl Run for SetArgs {
     fn run(self, context: &CommandContext) -> CommandResult {
-        let patience = Patience::within(self.wait.within);
+        let patience = self.asking.patience();
         let params = json!({ "name": self.member, "within_s": 0 });
-        let seen = ask(self.which.name.as_deref(), "get", &params, patience.left())?;
+        let seen = ask(self.asking.which.name.as_deref(), "get", &params, patience.left())?;
         let value = meant(&self.value, text(&seen["type"]));
         let params = json!({ "name": self.member, "value": value, "force": self.force });
-        request(context, "set", params, &self.which, &self.wait, &patience, self.json)
+        self.asking.request(context, "set", params, &patience)
     }
 }
 

@@ -42,21 +42,21 @@ pub struct Output {
     stderr_color: bool,
 }
 
-/// A style of a word. Styles mean the same in every command.
+/// A style of a word, by the number that terminals know it by. Styles mean the same in every command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Style {
     /// Headings.
-    Bold,
+    Bold = 1,
     /// What matters less.
-    Dim,
+    Dim = 2,
     /// Fine, running, exact.
-    Good,
+    Good = 32,
     /// Look at it: warnings, compensated.
-    Care,
+    Care = 33,
     /// Wrong, broken, irreversible.
-    Bad,
+    Bad = 31,
     /// Names.
-    Name,
+    Name = 36,
 }
 
 impl Output {
@@ -72,15 +72,7 @@ impl Output {
         if !self.stdout_color {
             return text.to_string();
         }
-        let code = match style {
-            Style::Bold => "1",
-            Style::Dim => "2",
-            Style::Good => "32",
-            Style::Care => "33",
-            Style::Bad => "31",
-            Style::Name => "36",
-        };
-        format!("\x1b[{code}m{text}\x1b[0m")
+        format!("\x1b[{}m{text}\x1b[0m", style as u8)
     }
 
     /// Text to stdout as it is.

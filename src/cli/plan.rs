@@ -141,10 +141,7 @@ fn show(out: &Output, one: &PlacedPlan<'_>, region: Option<&Region>) -> String {
             format!("{:>3}", step.id),
             out.paint(Style::Dim, shown.stage),
             said(&step.step),
-            out.paint(
-                style,
-                format!("{:?}", step.reversibility).to_lowercase() + if step.moves { ", moves" } else { "" },
-            ),
+            out.paint(style, step.reversibility.word().to_owned() + if step.moves { ", moves" } else { "" }),
             if undo.is_empty() {
                 String::new()
             } else {

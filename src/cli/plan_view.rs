@@ -3,7 +3,7 @@
 use crate::app::Application;
 use crate::model::{Ask, Snapshot};
 use crate::plan::{PlanStage, PlannedStep};
-use crate::system::{Reversibility, Undo};
+use crate::system::Undo;
 use serde::Serialize;
 use serde_json::{Map, Value as Json, json};
 use std::collections::BTreeSet;
@@ -27,18 +27,14 @@ impl<'a> PlanView<'a> {
     /// The view of one application.
     pub fn new(planned: &'a Application) -> Self {
         // The configuration that is applied, else the one that is undone.
-        let applied = planned.asks.iter().find_map(|ask| match ask {
-            Ask::Apply(id) => Some(id.to_string()),
-            _ => None,
-        });
-        let undone = || {
-            planned.asks.iter().find_map(|ask| match ask {
-                Ask::UndoOf(id) => Some(id.to_string()),
-                _ => None,
-            })
+        let configurations = || planned.asks.iter().filter(|ask| matches!(ask, Ask::Apply(_) | Ask::UndoOf(_)));
+        let one = configurations().find(|ask| !ask.is_undo()).or_else(|| configurations().next());
+        let configuration = match one {
+            Some(Ask::Apply(id) | Ask::UndoOf(id)) => id.to_string(),
+            _ => String::new(),
         };
         Self {
-            configuration: applied.or_else(undone).unwrap_or_default(),
+            configuration,
             coordinator: planned.coordinator.as_deref(),
             requests: planned.asks.iter().map(ToString::to_string).collect(),
             events: &planned.events,
@@ -114,12 +110,7 @@ impl ShownStep {
         view.insert("id".to_owned(), json!(step.id));
         view.insert("after".to_owned(), json!(self.after));
         view.insert("stage".to_owned(), json!(self.stage));
-        let reversibility = match step.reversibility {
-            Reversibility::Exact => "exact",
-            Reversibility::Compensated => "compensated",
-            Reversibility::Irreversible => "irreversible",
-        };
-        view.insert("reversibility".to_owned(), json!(reversibility));
+        view.insert("reversibility".to_owned(), json!(step.reversibility));
         view.insert("moves".to_owned(), json!(step.moves));
         let mut back = undo(&step.undo);
         back["moves"] = json!(step.undo_moves);

@@ -5,7 +5,7 @@ use super::log::duration;
 use super::output::Style;
 use super::remote::{Patience, WITHIN, WaitFor, Which, ask, seconds};
 use super::status::text;
-use super::{CommandContext, CommandFailure, CommandResult, Run};
+use super::{CommandContext, CommandResult, Run};
 use crate::configurator::WAY_OUT;
 use crate::model::finding::count;
 use serde_json::{Value as Json, json};
@@ -95,19 +95,13 @@ pub struct ApplyArgs {
     #[arg(long)]
     force: bool,
     #[command(flatten)]
-    which: Which,
-    #[command(flatten)]
-    wait: WaitFor,
-    /// Print JSON.
-    #[arg(long)]
-    json: bool,
+    asking: Asking,
 }
 
 impl Run for ApplyArgs {
     fn run(self, context: &CommandContext) -> CommandResult {
         let params = json!({ "configuration": self.configuration, "force": self.force });
-        let patience = Patience::within(self.wait.within);
-        request(context, "apply", params, &self.which, &self.wait, &patience, self.json)
+        self.asking.request(context, "apply", params, &self.asking.patience())
     }
 }
 
@@ -127,19 +121,13 @@ pub struct UndoArgs {
     #[arg(long)]
     force: bool,
     #[command(flatten)]
-    which: Which,
-    #[command(flatten)]
-    wait: WaitFor,
-    /// Print JSON.
-    #[arg(long)]
-    json: bool,
+    asking: Asking,
 }
 
 impl Run for UndoArgs {
     fn run(self, context: &CommandContext) -> CommandResult {
         let params = json!({ "configuration": self.configuration, "to": self.to, "force": self.force });
-        let patience = Patience::within(self.wait.within);
-        request(context, "undo", params, &self.which, &self.wait, &patience, self.json)
+        self.asking.request(context, "undo", params, &self.asking.patience())
     }
 }
 
@@ -165,49 +153,68 @@ impl Run for CommitArgs {
     fn run(self, context: &CommandContext) -> CommandResult {
         let wait = WaitFor { no_wait: false, wait: true, within: self.within };
         let params = json!({ "force": self.force });
-        let patience = Patience::within(wait.within);
-        request(context, "commit", params, &Which { name: self.name }, &wait, &patience, self.json)
+        let asking = Asking { which: Which { name: self.name }, wait, json: self.json };
+        asking.request(context, "commit", params, &asking.patience())
     }
 }
 
-/// Asks, and tells the answer if it is waited for.
-pub(super) fn request(
-    context: &CommandContext,
-    method: &str,
-    mut params: Json,
-    which: &Which,
-    wait: &WaitFor,
-    patience: &Patience,
-    json: bool,
-) -> Result<Exit, CommandFailure> {
-    let waits = !wait.no_wait;
-    params["wait"] = json!(waits);
-    params["within_s"] = json!(wait.within);
-    let out = &context.out;
-    let answer = ask(which.name.as_deref(), method, &params, patience.left())?;
-    let verdict = text(&answer["answer"]);
-    if json {
-        out.json(&answer);
-    } else if waits {
-        let ok = answer["ok"] == true;
-        out.line(format!(
-            "{} ({}, {})",
-            out.paint(if ok { Style::Good } else { Style::Bad }, verdict),
-            count(answer["steps"].as_array().map_or(0, Vec::len), "step"),
-            duration(answer["took_us"].as_f64().unwrap_or_default()),
-        ));
-        for reason in answer["reasons"].as_array().into_iter().flatten() {
-            out.line(format!("  {}", text(reason)));
-        }
-        if verdict.ends_with(".broken") {
-            out.error(format!("note: it is broken; {WAY_OUT}\n"));
-        }
-    } else {
-        out.line(format!("asked for as request {}; `davit log` shows how it is answered", answer["request"]));
+/// Whom a request goes to, and how its answer is waited for and told.
+#[derive(Debug, clap::Args)]
+pub(super) struct Asking {
+    #[command(flatten)]
+    #[allow(missing_docs)] // a doc comment here would become the help of the whole command
+    pub which: Which,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub wait: WaitFor,
+    /// Print JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl Asking {
+    /// How long its answer is waited for, from now on.
+    pub fn patience(&self) -> Patience {
+        Patience::within(self.wait.within)
     }
-    Ok(match (waits, answer["ok"] == true, verdict.ends_with(".broken")) {
-        (false, ..) | (_, true, _) => Exit::Done,
-        (_, _, true) => Exit::Broken,
-        _ => Exit::No,
-    })
+
+    /// Asks, and tells the answer if it is waited for.
+    pub fn request(
+        &self,
+        context: &CommandContext,
+        method: &str,
+        mut params: Json,
+        patience: &Patience,
+    ) -> CommandResult {
+        let waits = !self.wait.no_wait;
+        params["wait"] = json!(waits);
+        params["within_s"] = json!(self.wait.within);
+        let out = &context.out;
+        let answer = ask(self.which.name.as_deref(), method, &params, patience.left())?;
+        let verdict = text(&answer["answer"]);
+        if self.json {
+            out.json(&answer);
+        } else if waits {
+            let ok = answer["ok"] == true;
+            out.line(format!(
+                "{} ({}, {})",
+                out.paint(if ok { Style::Good } else { Style::Bad }, verdict),
+                count(answer["steps"].as_array().map_or(0, Vec::len), "step"),
+                duration(answer["took_us"].as_f64().unwrap_or_default()),
+            ));
+            for reason in answer["reasons"].as_array().into_iter().flatten() {
+                out.line(format!("  {}", text(reason)));
+            }
+            if verdict.ends_with(".broken") {
+                out.error(format!("note: it is broken; {WAY_OUT}\n"));
+            }
+        } else {
+            out.line(format!("asked for as request {}; `davit log` shows how it is answered", answer["request"]));
+        }
+        Ok(match (waits, answer["ok"] == true, verdict.ends_with(".broken")) {
+            (false, ..) | (_, true, _) => Exit::Done,
+            (_, _, true) => Exit::Broken,
+            _ => Exit::No,
+        })
+    }
 }

@@ -7,7 +7,6 @@ use super::status::{not_known, state_style, text};
 use crate::model::finding::count;
 use crate::session::StoppingView;
 use serde_json::Value as Json;
-use std::fmt::Write as _;
 
 /// Prints it; what is deeper than `depth` in a line each.
 pub fn print(out: &Output, status: &Json, depth: Option<usize>) {
@@ -98,24 +97,31 @@ fn own(out: &Output, status: &Json, part: &FilePart<'_>, known: bool) -> String 
     if top {
         held_by(out, status).into_iter().for_each(&mut line);
     }
+    titled(out, &mut said, "components", &components(out, part, true));
+    if !part.residual.is_empty() {
+        let residual: Vec<Json> = part.residual.iter().copied().cloned().collect();
+        said += &format!("{}\n{}", out.paint(Style::Bad, "what remains of what broke it"), listed(&residual));
+    }
+    said + &faults(out, part)
+}
+
+/// A table below its title, if it has rows.
+pub fn titled(out: &Output, page: &mut String, title: &str, table: &Table) {
+    if !table.is_empty() {
+        *page += &format!("{}\n{table}", out.paint(Style::Bold, title));
+    }
+}
+
+/// The components of one file, with what they run in where that is wanted.
+pub fn components(out: &Output, part: &FilePart<'_>, activities: bool) -> Table {
     let mut table = Table::new(2);
     for (name, component) in &part.components {
         let state = text(&component["state"]);
-        table.row([
-            out.paint(state_style(state), state),
-            (*name).to_owned(),
-            out.paint(Style::Dim, text(&component["type"])),
-            out.paint(Style::Dim, text(&component["activity"])),
-        ]);
+        let dim = |key: &str| out.paint(Style::Dim, text(&component[key]));
+        let activity = activities.then(|| dim("activity"));
+        table.row([out.paint(state_style(state), state), (*name).to_owned(), dim("type")].into_iter().chain(activity));
     }
-    if !table.is_empty() {
-        let _ = write!(said, "{}\n{table}", out.paint(Style::Bold, "components"));
-    }
-    if !part.residual.is_empty() {
-        let residual: Vec<Json> = part.residual.iter().copied().cloned().collect();
-        let _ = write!(said, "{}\n{}", out.paint(Style::Bad, "what remains of what broke it"), listed(&residual));
-    }
-    said + &faults(out, part)
+    table
 }
 
 /// Frames of others that hold something of a subsystem.

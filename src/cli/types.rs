@@ -9,7 +9,7 @@ use crate::lang;
 use crate::model::codes::CLI_UNKNOWN_TYPE;
 use crate::model::finding::did_you_mean;
 use crate::model::monitor::Condition;
-use crate::model::{Catalogue, ComponentType, Direction, Effect, GENERIC_INJECTIONS, InjectionParameter, Tunable};
+use crate::model::{Catalogue, ComponentType, Direction, Effect, GENERIC_INJECTIONS, InjectionParameter};
 use std::path::PathBuf;
 
 /// What component types offer: ports, properties, operations, with types, units, limits and what can be undone.
@@ -168,11 +168,6 @@ fn one(out: &Output, ty: &ComponentType) {
             (None, Some(max)) => format!("≤ {max}"),
             (None, None) => String::new(),
         };
-        let tunable = match property.tunable {
-            Tunable::Always => "always",
-            Tunable::Stopped => "stopped",
-            Tunable::Unconfigured => "unconfigured",
-        };
         let default = property.default.as_ref().map_or_else(|| "required".to_owned(), |v| format!("= {v}"));
         let unit = property.unit.as_deref().unwrap_or_default().to_owned();
         table.row([
@@ -181,7 +176,7 @@ fn one(out: &Output, ty: &ComponentType) {
             default,
             unit,
             limits,
-            tunable.to_owned(),
+            property.tunable.to_string(),
             property.doc.clone(),
         ]);
     }

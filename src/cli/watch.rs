@@ -12,7 +12,7 @@ use super::log::duration;
 use super::output::{self, Output, Style, Table};
 use super::remote::{connect, failure, seconds};
 use super::status::{not_known, state_style, text};
-use super::status_view::{heading, held_by, indented, title};
+use super::status_view::{components, heading, held_by, indented, title, titled};
 use super::{CommandContext, CommandResult, Run};
 use crate::model::finding::count;
 use crate::model::names::level;
@@ -274,12 +274,6 @@ fn drawn(out: &Output, look: &Json, depth: Option<usize>) -> String {
     page.trim_end().to_owned()
 }
 
-fn titled(out: &Output, page: &mut String, title: &str, table: &Table) {
-    if !table.is_empty() {
-        *page += &format!("{}\n{table}", out.paint(Style::Bold, title));
-    }
-}
-
 /// What of a look is of one file.
 fn own(out: &Output, status: &Json, part: &FilePart<'_>, monitors: &[Json]) -> String {
     let states = out.paint(Style::Name, states(part));
@@ -301,16 +295,7 @@ fn own(out: &Output, status: &Json, part: &FilePart<'_>, monitors: &[Json]) -> S
         let word = out.paint(Style::Bad, "fault");
         page += &format!("{word}        {}: {}\n", text(&fault["component"]), text(&fault["reason"]));
     }
-    let mut components = Table::new(2);
-    for (name, component) in &part.components {
-        let state = text(&component["state"]);
-        components.row([
-            out.paint(state_style(state), state),
-            (*name).to_owned(),
-            out.paint(Style::Dim, text(&component["type"])),
-        ]);
-    }
-    titled(out, &mut page, "components", &components);
+    titled(out, &mut page, "components", &components(out, part, false));
     let mut watched = Table::new(2);
     let its = |name: &str| part.components.iter().any(|(own, _)| *own == name);
     for monitor in monitors.iter().filter(|monitor| its(text(&monitor["component"]))) {

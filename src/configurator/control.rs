@@ -1,6 +1,7 @@
 //! What the session asks of the configurator beside requests: how things stand, and to take everything down.
 
 use super::request::{Reason, Request, Residual};
+use crate::model::words::words;
 use crate::model::{ComponentName, ConfigId, Configuration, RequestId, Snapshot, Step};
 use crate::stack::{Frame, FrameId, Requester};
 use crate::time::{Sender, Time};
@@ -145,14 +146,16 @@ pub struct Drift {
     pub observed: bool,
 }
 
-/// How a broken system is recovered.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Recovery {
-    /// To the system before the interrupted application.
-    Back,
-    /// The system as it is becomes the one that should be; the stack is discarded. For when a person has decided that
-    /// what is there is right.
-    Accept,
+words! {
+    /// How a broken system is recovered.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    pub enum Recovery by word {
+        /// To the system before the interrupted application.
+        Back = "back",
+        /// The system as it is becomes the one that should be; the stack is discarded. For when a person has decided that
+        /// what is there is right.
+        Accept = "accept",
+    }
 }
 
 /// What somebody tells it, with where its answer goes.

@@ -1,8 +1,8 @@
 //! What is told while requests are carried out: each step with how it ended and how long it took.
 
 use super::request::{Answer, Reason, Request, Residual};
+use crate::model::words::{sent_as_shown, words};
 use crate::model::{ComponentName, ConfigId, Ident, MemberRef, Outcome, RequestId, Step};
-use serde::{Serialize, Serializer};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -45,22 +45,19 @@ impl std::fmt::Display for StepName {
     }
 }
 
-impl Serialize for StepName {
-    fn serialize<S: Serializer>(&self, s: S) -> Result<S::Ok, S::Error> {
-        s.collect_str(self)
-    }
-}
+sent_as_shown!(StepName);
 
-/// How a step ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum StepEnd {
-    /// It happened.
-    Done,
-    /// It did not happen.
-    NotDone,
-    /// Nobody knows yet.
-    Unknown,
+words! {
+    /// How a step ended.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    pub enum StepEnd by word {
+        /// It happened.
+        Done = "done",
+        /// It did not happen.
+        NotDone = "not done",
+        /// Nobody knows yet.
+        Unknown = "unknown",
+    }
 }
 
 impl From<&Outcome> for StepEnd {

@@ -209,18 +209,7 @@ mod tests {
             let mut description = ComponentType::new(ty, "");
             for (ports, direction) in [(ins, PortDirection::In), (outs, PortDirection::Out)] {
                 for port in ports.split_whitespace() {
-                    description.ports.insert(
-                        ident(port),
-                        PortType {
-                            direction,
-                            ty: ValueType::Float,
-                            unit: None,
-                            buffered: false,
-                            required: false,
-                            doc: String::new(),
-                            origin: crate::model::Origin::NONE,
-                        },
-                    );
+                    description.ports.insert(ident(port), PortType::new(direction, ValueType::Float));
                 }
             }
             catalogue.insert(description);

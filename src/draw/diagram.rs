@@ -22,9 +22,10 @@ pub enum Subject {
 }
 
 /// The outline of a node.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Shape {
     /// A box with text and, where given, ports.
+    #[default]
     Box,
     /// A box around its children (drawn empty when it has none).
     Group,
@@ -53,7 +54,7 @@ pub enum Tone {
 }
 
 /// A node.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct DiagramNode {
     /// Its name among all nodes of the diagram.
     pub id: String,
@@ -76,16 +77,7 @@ pub struct DiagramNode {
 impl DiagramNode {
     /// A plain box at the top level.
     pub fn new(id: impl Into<String>, title: impl Into<String>) -> Self {
-        Self {
-            id: id.into(),
-            parent: None,
-            shape: Shape::Box,
-            title: title.into(),
-            lines: Vec::new(),
-            tone: Tone::Plain,
-            ins: Vec::new(),
-            outs: Vec::new(),
-        }
+        Self { id: id.into(), title: title.into(), ..Self::default() }
     }
 }
 

@@ -8,7 +8,7 @@ use super::merge::merge;
 use super::tables::{NotBuilt, address};
 use super::values::to_json;
 use crate::limits;
-use crate::statechart::{Hook, Machine, MicrostepResult, NodeId, NodeKind, Printer};
+use crate::statechart::{Hook, Machine, MicrostepResult, NodeId, Printer};
 use crate::time::Time;
 use mlua::{Function, Lua, MultiValue, Result, Table, Value};
 use std::rc::{Rc, Weak};
@@ -198,12 +198,7 @@ fn growing(lua: &Lua, host: &Rc<Host>) -> Result<()> {
     // How a path goes on at a node. Asked of the chart: what became a parent only while the machine ran is a leaf still.
     shared(lua, host, "ends", |_, host, node: Table| {
         let (bound, id) = state_of(host, &node)?;
-        let kind = bound.tables().chart.kind(id);
-        Ok(match kind {
-            NodeKind::Leaf => "leaf",
-            NodeKind::Composite => "composite",
-            NodeKind::Connector => "connector",
-        })
+        Ok(bound.tables().chart.kind(id).word())
     })?;
     // Nothing: any event does; else whether the transition lists this one.
     shared(lua, host, "lists", |_, host, (fsm, transition, event): (Table, Table, Value)| {

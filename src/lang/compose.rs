@@ -4,11 +4,10 @@ use super::tree::Cx;
 use crate::model::condition_walk::Looked;
 use crate::model::finding::{did_you_mean, nearest};
 use crate::model::monitor::Condition;
-use crate::model::subsystem::ExportKind;
 use crate::model::within::Within;
 use crate::model::{
-    ChangeKind, ComponentName, Configuration, Deployment, Finding, Ident, MemberRef, OperatorMay, Origin, Subsystem,
-    Target, codes,
+    ChangeKind, ComponentName, Configuration, Deployment, Finding, Ident, MemberClass, MemberRef, OperatorMay, Origin,
+    Subsystem, Target, codes,
 };
 use std::sync::Arc;
 
@@ -158,16 +157,16 @@ impl Resolve<'_> {
                 | ChangeKind::Destroy { component }
                 | ChangeKind::Replace { component, .. } => self.not_own(cx, *component, at),
                 ChangeKind::Connect { from, to, .. } | ChangeKind::Disconnect { from, to } => {
-                    *from = self.member(cx, *from, ExportKind::Port, at, "");
-                    *to = self.member(cx, *to, ExportKind::Port, at, "");
+                    *from = self.member(cx, *from, MemberClass::Port, at, "");
+                    *to = self.member(cx, *to, MemberClass::Port, at, "");
                 }
                 ChangeKind::PropertySet { property, .. } => {
-                    *property = self.member(cx, *property, ExportKind::Property, at, "");
+                    *property = self.member(cx, *property, MemberClass::Property, at, "");
                 }
-                ChangeKind::PortWrite { port, .. } => *port = self.member(cx, *port, ExportKind::Port, at, ""),
+                ChangeKind::PortWrite { port, .. } => *port = self.member(cx, *port, MemberClass::Port, at, ""),
                 ChangeKind::OperationCall { call, undo } => {
                     for call in std::iter::once(call).chain(undo) {
-                        call.operation = self.member(cx, call.operation, ExportKind::Operation, at, "");
+                        call.operation = self.member(cx, call.operation, MemberClass::Operation, at, "");
                     }
                 }
             }
@@ -186,20 +185,20 @@ impl Resolve<'_> {
     fn condition(&self, cx: &mut Cx, of: &mut Condition, origin: Origin) {
         let at = if of.origin.is_some() { of.origin } else { origin };
         of.for_each_member_mut(&mut |looked| match looked {
-            Looked::Member(member) => *member = self.member(cx, *member, ExportKind::Port, at, ""),
+            Looked::Member(member) => *member = self.member(cx, *member, MemberClass::Port, at, ""),
             Looked::Component(component) => self.not_own(cx, *component, at),
             Looked::Activity(_) => {}
         });
     }
 
     /// What a member is that is exported; of what is not, what it is is no matter.
-    fn kind_of(&self, member: MemberRef) -> ExportKind {
+    fn kind_of(&self, member: MemberRef) -> MemberClass {
         let export = self.named(member.component.as_str()).and_then(|of| of.own.interface.exports.get(&member.member));
-        export.map_or(ExportKind::Property, |export| export.kind)
+        export.map_or(MemberClass::Property, |export| export.kind)
     }
 
     /// What a member is that is written so: of a subsystem what it exports under that name.
-    fn member(&self, cx: &mut Cx, member: MemberRef, kind: ExportKind, at: Origin, place: &str) -> MemberRef {
+    fn member(&self, cx: &mut Cx, member: MemberRef, kind: MemberClass, at: Origin, place: &str) -> MemberRef {
         let Some(subsystem) = self.holding(member.component) else { return member };
         let exports = &subsystem.own.interface.exports;
         if member.component.as_str() != subsystem.name.as_str() {
@@ -210,7 +209,7 @@ impl Resolve<'_> {
                 Some((alias, _)) => format!("write `{}.{alias}`", subsystem.name),
                 None => format!(
                     "export it in its file (`exports: {{ {}: {{ {}: {inner} }} }}`), and write `{}.{}`",
-                    kind.key(),
+                    kind.several(),
                     member.member,
                     subsystem.name,
                     member.member
@@ -229,8 +228,11 @@ impl Resolve<'_> {
                 MemberRef { component: export.of.component.within(subsystem.name), member: export.of.member }
             }
             Some(export) => {
-                let message =
-                    format!("`{member}` is exported under `{}`, and not under `{}`", export.kind.key(), kind.key());
+                let message = format!(
+                    "`{member}` is exported under `{}`, and not under `{}`",
+                    export.kind.several(),
+                    kind.several()
+                );
                 let finding = Finding::error(codes::COMPOSE_NOT_EXPORTED, message).at(at).path(place);
                 cx.report(
                     finding
@@ -242,7 +244,7 @@ impl Resolve<'_> {
             None => {
                 let message = format!("`{}` exports nothing called `{}`", subsystem.name, member.member);
                 let known = exports.iter().filter(|(_, export)| export.kind == kind).map(|(name, _)| name.as_str());
-                let (name, key) = (member.member, kind.key());
+                let (name, key) = (member.member, kind.several());
                 let help = did_you_mean(name.as_str(), key, known.clone());
                 let help = match nearest(name.as_str(), known) {
                     Some(_) => help,

@@ -18,11 +18,7 @@ impl std::fmt::Debug for Code {
     }
 }
 
-impl serde::Serialize for Code {
-    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.serialize_str(self.0)
-    }
-}
+super::words::sent_as_shown!(Code);
 
 /// A code with its page.
 #[derive(Debug, Clone, Copy)]

@@ -7,6 +7,7 @@ use super::names::{ComponentName, Ident, TypeName};
 use super::resource::Resource;
 use super::run_state::RunState;
 use super::value::{FitError, Value, ValueType};
+use super::words::words;
 use rustc_hash::FxHashMap;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -67,23 +68,47 @@ pub struct Irreversible {
     pub destroy: bool,
 }
 
-/// In or out.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Direction {
-    /// Read by the component.
-    In,
-    /// Written by the component.
-    Out,
+words! {
+    /// A kind of what components have.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+    pub enum MemberClass by word {
+        /// A port.
+        Port = "port",
+        /// A property.
+        Property = "property",
+        /// An operation.
+        Operation = "operation",
+    }
 }
 
-impl Direction {
-    /// As it is written.
-    pub fn word(self) -> &'static str {
+impl MemberClass {
+    /// What several are called, which is also the key that they are listed under.
+    pub fn several(self) -> &'static str {
         match self {
-            Self::In => "in",
-            Self::Out => "out",
+            Self::Port => "ports",
+            Self::Property => "properties",
+            Self::Operation => "operations",
         }
+    }
+
+    /// The names of those that a type has.
+    pub fn of(self, ty: &ComponentType) -> Vec<&'static str> {
+        match self {
+            Self::Port => ty.ports.keys().map(Ident::as_str).collect(),
+            Self::Property => ty.properties.keys().map(Ident::as_str).collect(),
+            Self::Operation => ty.operations.keys().map(Ident::as_str).collect(),
+        }
+    }
+}
+
+words! {
+    /// In or out.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+    pub enum Direction by word {
+        /// Read by the component.
+        In = "in",
+        /// Written by the component.
+        Out = "out",
     }
 }
 
@@ -109,23 +134,30 @@ pub struct PortType {
 }
 
 impl PortType {
+    /// One of which nothing else is said.
+    pub fn new(direction: Direction, ty: ValueType) -> Self {
+        let (buffered, required) = (false, false);
+        Self { direction, ty, unit: None, buffered, required, doc: String::new(), origin: Origin::NONE }
+    }
+
     /// Whether it carries event names.
     pub fn is_event(&self) -> bool {
         self.ty == ValueType::Event
     }
 }
 
-/// In which run states a property may be set.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Default)]
-#[serde(rename_all = "lowercase")]
-pub enum Tunable {
-    /// Only while unconfigured.
-    Unconfigured,
-    /// While unconfigured or stopped.
-    Stopped,
-    /// Also while running (and faulted).
-    #[default]
-    Always,
+words! {
+    /// In which run states a property may be set.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
+    pub enum Tunable by word {
+        /// Only while unconfigured.
+        Unconfigured = "unconfigured",
+        /// While unconfigured or stopped.
+        Stopped = "stopped",
+        /// Also while running (and faulted).
+        #[default]
+        Always = "always",
+    }
 }
 
 impl Tunable {
@@ -189,6 +221,11 @@ fn outside(value: f64, min: Option<f64>, max: Option<f64>) -> String {
 }
 
 impl PropertyType {
+    /// One of which nothing else is said.
+    pub fn new(ty: ValueType, tunable: Tunable) -> Self {
+        Self { ty, default: None, min: None, max: None, tunable, unit: None, doc: String::new(), origin: Origin::NONE }
+    }
+
     /// `value` as a value of this property: of its type, within its limits.
     ///
     /// # Errors

@@ -50,7 +50,7 @@ impl Deployment {
     pub fn is_told_of(&self, event: &str) -> bool {
         let Some((path, word)) = event.rsplit_once('/') else { return false };
         self.subsystem(path).is_some()
-            && (word.ends_with(IGNORED) || SubsystemStanding::ALL.iter().any(|standing| standing.word() == word))
+            && (word.ends_with(IGNORED) || SubsystemStanding::WORDS.iter().any(|(own, _)| *own == word))
     }
 
     /// What is written in its own file alone: with subsystems the rest of it is made of theirs.

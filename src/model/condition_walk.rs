@@ -4,24 +4,37 @@ use super::finding::Origin;
 use super::monitor::{Condition, ConditionKind, MonitoredSignal, SignalKind};
 use super::names::{ComponentName, Ident, MemberRef};
 
-impl Condition {
-    /// Calls `f` with it and all that it is made of, outer ones first.
-    pub fn for_each<'a>(&'a self, f: &mut impl FnMut(&'a Self)) {
+/// What a condition of this kind is made of, to be looked at or to be changed.
+macro_rules! parts {
+    ($kind:expr) => {{
         use ConditionKind as K;
-        f(self);
-        match &self.kind {
-            K::Compare { .. } | K::IsTrue(_) | K::InState { .. } | K::Faulted(_) | K::Silent { .. } => {}
-            K::All(list) | K::Any(list) => list.iter().for_each(|c| c.for_each(f)),
-            K::No(c) | K::Rise(c) | K::Fall(c) => c.for_each(f),
+        match $kind {
+            K::Compare { .. } | K::IsTrue(_) | K::InState { .. } | K::Faulted(_) | K::Silent { .. } => Vec::new(),
+            K::All(list) | K::Any(list) => Vec::from_iter(list),
+            K::No(c) | K::Rise(c) | K::Fall(c) => vec![c],
             K::Once { condition: c, .. }
             | K::Historically { condition: c, .. }
             | K::ForAtLeast { condition: c, .. }
-            | K::WithinLast { condition: c, .. } => c.for_each(f),
-            K::Implies(a, b) | K::Since { hold: a, from: b, .. } => {
-                a.for_each(f);
-                b.for_each(f);
-            }
+            | K::WithinLast { condition: c, .. } => vec![c],
+            K::Implies(a, b) | K::Since { hold: a, from: b, .. } => vec![a, b],
         }
+    }};
+}
+
+impl Condition {
+    /// What it is made of.
+    pub fn parts(&self) -> Vec<&Self> {
+        parts!(&self.kind)
+    }
+
+    fn parts_mut(&mut self) -> Vec<&mut Self> {
+        parts!(&mut self.kind)
+    }
+
+    /// Calls `f` with it and all that it is made of, outer ones first.
+    pub fn for_each<'a>(&'a self, f: &mut impl FnMut(&'a Self)) {
+        f(self);
+        self.parts().into_iter().for_each(|part| part.for_each(f));
     }
 
     /// Calls `f` with every signal in it, outer ones first.
@@ -71,17 +84,9 @@ impl Condition {
             K::IsTrue(port) => f(Looked::Member(&mut port.member)),
             K::InState { component, .. } | K::Faulted(component) => f(Looked::Component(component)),
             K::Silent { port, .. } => f(Looked::Member(port)),
-            K::All(list) | K::Any(list) => list.iter_mut().for_each(|c| c.for_each_member_mut(f)),
-            K::No(c) | K::Rise(c) | K::Fall(c) => c.for_each_member_mut(f),
-            K::Once { condition: c, .. }
-            | K::Historically { condition: c, .. }
-            | K::ForAtLeast { condition: c, .. }
-            | K::WithinLast { condition: c, .. } => c.for_each_member_mut(f),
-            K::Implies(a, b) | K::Since { hold: a, from: b, .. } => {
-                a.for_each_member_mut(f);
-                b.for_each_member_mut(f);
-            }
+            _ => {}
         }
+        self.parts_mut().into_iter().for_each(|part| part.for_each_member_mut(f));
     }
 }
 

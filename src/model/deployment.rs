@@ -11,6 +11,7 @@ use super::program::Program;
 use super::statechart::{Statechart, is_internal};
 use super::subsystem::Interface;
 use super::value::Value;
+use super::words::words;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
@@ -152,47 +153,24 @@ pub struct StepFault {
     pub origin: Origin,
 }
 
-/// How a step goes wrong.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum FaultKind {
-    /// It is not done, and that is answered at once.
-    Fail,
-    /// Its call never comes back, also when it is given up: nothing is answered by the deadline, and the component is in
-    /// quarantine for good.
-    Hang,
-    /// The same, but its call comes back [`FAULT_LATE`](crate::limits::FAULT_LATE) after the deadline; what it had done is
-    /// taken back then, and the component leaves quarantine.
-    Late,
-    /// The request is lost: it is not done, and nothing is answered by the deadline. The component is well.
-    Lost,
-    /// It is not done, and the answer says at once that it was.
-    Lie,
-    /// It takes so long ([`StepFault::takes`]), and can be given up meanwhile. What else goes wrong with it does so then.
-    Slow,
-}
-
-impl FaultKind {
-    /// All, with the words they are written by.
-    pub const NAMES: [(&'static str, Self); 6] = [
-        ("fail", Self::Fail),
-        ("hang", Self::Hang),
-        ("late", Self::Late),
-        ("lost", Self::Lost),
-        ("lie", Self::Lie),
-        ("slow", Self::Slow),
-    ];
-
-    /// Its word.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Fail => "fail",
-            Self::Hang => "hang",
-            Self::Late => "late",
-            Self::Lost => "lost",
-            Self::Lie => "lie",
-            Self::Slow => "slow",
-        }
+words! {
+    /// How a step goes wrong.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+    pub enum FaultKind by word {
+        /// It is not done, and that is answered at once.
+        Fail = "fail",
+        /// Its call never comes back, also when it is given up: nothing is answered by the deadline, and the component is in
+        /// quarantine for good.
+        Hang = "hang",
+        /// The same, but its call comes back [`FAULT_LATE`](crate::limits::FAULT_LATE) after the deadline; what it had done is
+        /// taken back then, and the component leaves quarantine.
+        Late = "late",
+        /// The request is lost: it is not done, and nothing is answered by the deadline. The component is well.
+        Lost = "lost",
+        /// It is not done, and the answer says at once that it was.
+        Lie = "lie",
+        /// It takes so long ([`StepFault::takes`]), and can be given up meanwhile. What else goes wrong with it does so then.
+        Slow = "slow",
     }
 }
 

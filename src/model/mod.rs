@@ -28,9 +28,11 @@ pub mod step;
 pub mod subsystem;
 pub mod value;
 pub mod within;
+pub mod words;
 
 pub use component_type::{
-    Catalogue, ComponentType, Direction, Effect, Irreversible, Moves, OperationType, PortType, PropertyType, Tunable,
+    Catalogue, ComponentType, Direction, Effect, Irreversible, MemberClass, Moves, OperationType, PortType,
+    PropertyType, Tunable,
 };
 pub use configuration::{Call, Change, ChangeKind, Configuration, Confirm, OnFailure, Policy};
 pub use deployment::{
@@ -53,5 +55,5 @@ pub use snapshot::{ActivityStatus, ComponentSnapshot, Snapshot};
 pub use state_list::{DefaultTwice, StateEntry, StateList, Target};
 pub use statechart::Statechart;
 pub use step::Step;
-pub use subsystem::{Export, ExportKind, Interface, LeavingRule, SubsystemStanding};
+pub use subsystem::{Export, Interface, LeavingRule, SubsystemStanding};
 pub use value::{Value, ValueType};

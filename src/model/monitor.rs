@@ -5,6 +5,7 @@
 use super::finding::Origin;
 use super::names::{ComponentName, EventName, Ident, MemberRef, NameError, TypeName};
 use super::run_state::RunState;
+use super::words::words;
 use std::fmt;
 use std::time::Duration;
 
@@ -140,39 +141,26 @@ pub enum ConditionKind {
     },
 }
 
-/// How two signals are compared.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Comparison {
-    /// `<`
-    Below,
-    /// `<=`
-    AtMost,
-    /// `>`
-    Above,
-    /// `>=`
-    AtLeast,
-    /// `==`
-    Equals,
-    /// `!=`
-    Differs,
+words! {
+    /// How two signals are compared.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+    pub enum Comparison by word {
+        /// `<`
+        Below = "below",
+        /// `<=`
+        AtMost = "at_most",
+        /// `>`
+        Above = "above",
+        /// `>=`
+        AtLeast = "at_least",
+        /// `==`
+        Equals = "equals",
+        /// `!=`
+        Differs = "differs",
+    }
 }
 
 impl Comparison {
-    /// All, in the order of the list above.
-    pub const ALL: [Self; 6] = [Self::Below, Self::AtMost, Self::Above, Self::AtLeast, Self::Equals, Self::Differs];
-
-    /// The word it is written by.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Below => "below",
-            Self::AtMost => "at_most",
-            Self::Above => "above",
-            Self::AtLeast => "at_least",
-            Self::Equals => "equals",
-            Self::Differs => "differs",
-        }
-    }
-
     /// Whether one side may be beyond the other: the ones that can have a hysteresis.
     pub fn is_ordered(self) -> bool {
         !matches!(self, Self::Equals | Self::Differs)
@@ -232,36 +220,18 @@ pub enum SignalKind {
     Constant(f64),
 }
 
-/// What is known of an activity.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Counter {
-    /// Rounds of updates begun.
-    Cycles,
-    /// Periods that were missed because a round took too long.
-    Overruns,
-    /// How late the last round began, in seconds.
-    Latency,
-    /// How long the last round took, in seconds.
-    Duration,
-}
-
-impl Counter {
-    /// All, with the words they are written by.
-    pub const NAMES: [(&'static str, Self); 4] = [
-        ("cycles", Self::Cycles),
-        ("overruns", Self::Overruns),
-        ("latency", Self::Latency),
-        ("duration", Self::Duration),
-    ];
-
-    /// Its word.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Cycles => "cycles",
-            Self::Overruns => "overruns",
-            Self::Latency => "latency",
-            Self::Duration => "duration",
-        }
+words! {
+    /// What is known of an activity.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+    pub enum Counter by word {
+        /// Rounds of updates begun.
+        Cycles = "cycles",
+        /// Periods that were missed because a round took too long.
+        Overruns = "overruns",
+        /// How late the last round began, in seconds.
+        Latency = "latency",
+        /// How long the last round took, in seconds.
+        Duration = "duration",
     }
 }
 

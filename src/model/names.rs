@@ -8,7 +8,7 @@
 //! `left/Dynamics.force_gain`.
 
 use super::value::Value;
-use serde::{Serialize, Serializer};
+use super::words::sent_as_shown;
 use std::fmt;
 use ustr::Ustr;
 
@@ -38,6 +38,26 @@ fn is_plain(text: &str) -> bool {
 }
 
 const PLAIN: &str = "letters, digits and `_`, not starting with a digit";
+
+/// What is made of its text by `new`, and everywhere shown as it.
+macro_rules! text {
+    ($name:ident) => {
+        impl fmt::Debug for $name {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                fmt::Display::fmt(self, f)
+            }
+        }
+
+        impl std::str::FromStr for $name {
+            type Err = NameError;
+            fn from_str(text: &str) -> Result<Self, NameError> {
+                Self::new(text)
+            }
+        }
+
+        sent_as_shown!($name);
+    };
+}
 
 macro_rules! name {
     ($(#[$doc:meta])* $name:ident, $kind:literal, $valid:expr, $reason:expr) => {
@@ -77,25 +97,7 @@ macro_rules! name {
             }
         }
 
-        impl fmt::Debug for $name {
-            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str(self.as_str())
-            }
-        }
-
-        impl std::str::FromStr for $name {
-            type Err = NameError;
-            fn from_str(text: &str) -> Result<Self, NameError> {
-                Self::new(text)
-            }
-        }
-
-        impl Serialize for $name {
-            fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-                serializer.serialize_str(self.as_str())
-            }
-        }
-
+        text!($name);
     };
 }
 
@@ -271,24 +273,7 @@ impl fmt::Display for MemberRef {
     }
 }
 
-impl fmt::Debug for MemberRef {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        fmt::Display::fmt(self, f)
-    }
-}
-
-impl std::str::FromStr for MemberRef {
-    type Err = NameError;
-    fn from_str(text: &str) -> Result<Self, NameError> {
-        Self::new(text)
-    }
-}
-
-impl Serialize for MemberRef {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_str(self)
-    }
-}
+text!(MemberRef);
 
 #[cfg(test)]
 mod tests {

@@ -3,7 +3,6 @@
 use super::component_type::{ComponentType, Tunable};
 use super::names::Ident;
 use super::value::{Value, ValueType};
-use serde::{Serialize, Serializer};
 use std::fmt;
 use std::sync::Arc;
 
@@ -102,11 +101,7 @@ impl fmt::Display for Resource {
     }
 }
 
-impl Serialize for Resource {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.serialize_str(&self.text)
-    }
-}
+super::words::sent_as_shown!(Resource);
 
 #[cfg(test)]
 mod tests {

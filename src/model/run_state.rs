@@ -1,20 +1,21 @@
 //! Run states and their legal transitions (semantics: *Words*).
 
-use serde::Serialize;
+use super::words::words;
 use std::fmt;
 
-/// The run state of a component.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum RunState {
-    /// Created, or cleaned up.
-    Unconfigured,
-    /// Configured, not updated.
-    Stopped,
-    /// Updated by its activity.
-    Running,
-    /// Failed by itself. Ways out: cleanup (to unconfigured) and destroy. Never demanded, never restored.
-    Faulted,
+words! {
+    /// The run state of a component.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+    pub enum RunState by as_str {
+        /// Created, or cleaned up.
+        Unconfigured = "unconfigured",
+        /// Configured, not updated.
+        Stopped = "stopped",
+        /// Updated by its activity.
+        Running = "running",
+        /// Failed by itself. Ways out: cleanup (to unconfigured) and destroy. Never demanded, never restored.
+        Faulted = "faulted",
+    }
 }
 
 /// A run state that can be demanded: nobody brings a component to `faulted`.
@@ -44,18 +45,19 @@ impl fmt::Display for Wanted {
     }
 }
 
-/// A move between run states.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Transition {
-    /// unconfigured → stopped
-    Configure,
-    /// stopped → running
-    Start,
-    /// running → stopped
-    Stop,
-    /// stopped or faulted → unconfigured
-    Cleanup,
+words! {
+    /// A move between run states.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+    pub enum Transition by as_str {
+        /// unconfigured → stopped
+        Configure = "configure",
+        /// stopped → running
+        Start = "start",
+        /// running → stopped
+        Stop = "stop",
+        /// stopped or faulted → unconfigured
+        Cleanup = "cleanup",
+    }
 }
 
 impl Transition {
@@ -92,16 +94,6 @@ impl Transition {
             Self::Stop => Self::Start,
         }
     }
-
-    /// Its name: `configure`, `start`, `stop`, `cleanup`.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Configure => "configure",
-            Self::Start => "start",
-            Self::Stop => "stop",
-            Self::Cleanup => "cleanup",
-        }
-    }
 }
 
 impl RunState {
@@ -132,16 +124,6 @@ impl RunState {
         }
     }
 
-    /// Our name of it.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Unconfigured => "unconfigured",
-            Self::Stopped => "stopped",
-            Self::Running => "running",
-            Self::Faulted => "faulted",
-        }
-    }
-
     /// The state a text names, in our words or the field's (RTT, ROS 2, microblx, the paper).
     pub fn from_name(text: &str) -> Option<Self> {
         Some(match text {
@@ -167,18 +149,6 @@ impl RunState {
         "configure",
         "configured",
     ];
-}
-
-impl fmt::Display for RunState {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.as_str())
-    }
-}
-
-impl fmt::Display for Transition {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.as_str())
-    }
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@
 
 use super::finding::Origin;
 use super::names::{ConfigId, EventName, Ident, NameError};
+use super::words::words;
 use std::fmt;
 
 /// A hierarchical statechart.
@@ -339,22 +340,14 @@ pub struct TimeEvent {
     pub by: Option<FunctionId>,
 }
 
-/// From when a time event counts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Since {
-    /// From the entry of the source (`e_after`).
-    Entry,
-    /// From the clock's start (`e_at`).
-    Start,
-}
-
-impl Since {
-    /// The word it is written with.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Entry => "e_after",
-            Self::Start => "e_at",
-        }
+words! {
+    /// From when a time event counts.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    pub enum Since by word {
+        /// From the entry of the source (`e_after`).
+        Entry = "e_after",
+        /// From the clock's start (`e_at`).
+        Start = "e_at",
     }
 }
 

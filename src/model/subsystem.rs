@@ -1,9 +1,9 @@
 //! Composition: a deployment as a part of another one (semantics: *Composition*).
 
-use super::component_type::PropertyType;
+use super::component_type::{MemberClass, PropertyType};
 use super::finding::Origin;
 use super::names::{EventName, Ident, MemberRef};
-use serde::Serialize;
+use super::words::words;
 use std::collections::BTreeMap;
 
 /// What a deployment shows to one that it is a subsystem of.
@@ -25,34 +25,11 @@ pub struct Interface {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Export {
     /// What it is.
-    pub kind: ExportKind,
+    pub kind: MemberClass,
     /// Which: of a component of the file, or of a subsystem.
     pub of: MemberRef,
     /// Where it was written.
     pub origin: Origin,
-}
-
-/// What can be exported.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum ExportKind {
-    /// A port.
-    Port,
-    /// A property.
-    Property,
-    /// An operation.
-    Operation,
-}
-
-impl ExportKind {
-    /// All, with the keys they are listed under.
-    pub const KEYS: [(&'static str, Self); 3] =
-        [("ports", Self::Port), ("properties", Self::Property), ("operations", Self::Operation)];
-
-    /// The key that it is listed under.
-    pub fn key(self) -> &'static str {
-        Self::KEYS.into_iter().find(|(_, kind)| *kind == self).map_or("", |(key, _)| key)
-    }
 }
 
 /// How a subsystem leaves: it says so, and waits until it is let go.
@@ -66,35 +43,23 @@ pub struct LeavingRule {
     pub origin: Origin,
 }
 
-/// What a parent is told of a subsystem without anybody writing it. None of these words is free as a name of an event that is
-/// emitted.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum SubsystemStanding {
-    /// Its *up* states are active, and all that its coordinators asked for is answered.
-    Up,
-    /// One that means that the bring-up failed is, or it was not up in time.
-    Failed,
-    /// It is down, and nothing is left of it.
-    Down,
-    /// It was not down in time.
-    Stranded,
+words! {
+    /// What a parent is told of a subsystem without anybody writing it. None of these words is free as a name of an event that is
+    /// emitted.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+    pub enum SubsystemStanding by word {
+        /// Its *up* states are active, and all that its coordinators asked for is answered.
+        Up = "up",
+        /// One that means that the bring-up failed is, or it was not up in time.
+        Failed = "failed",
+        /// It is down, and nothing is left of it.
+        Down = "down",
+        /// It was not down in time.
+        Stranded = "stranded",
+    }
 }
 
 impl SubsystemStanding {
-    /// All of them.
-    pub const ALL: [Self; 4] = [Self::Up, Self::Failed, Self::Down, Self::Stranded];
-
-    /// Its word.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Up => "up",
-            Self::Failed => "failed",
-            Self::Down => "down",
-            Self::Stranded => "stranded",
-        }
-    }
-
     /// The event that tells it to the parent of the subsystem of that path.
     ///
     /// # Panics

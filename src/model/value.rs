@@ -316,11 +316,7 @@ impl fmt::Display for ValueType {
     }
 }
 
-impl Serialize for ValueType {
-    fn serialize<S: serde::Serializer>(&self, s: S) -> Result<S::Ok, S::Error> {
-        s.collect_str(self)
-    }
-}
+super::words::sent_as_shown!(ValueType);
 
 /// Why a text is not a type.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

@@ -16,6 +16,7 @@ pub mod replace;
 mod tests;
 pub mod undo;
 
+use crate::model::words::words;
 use crate::model::{ComponentName, ConfigId, Configuration, Deployment, Finding, Findings, Ident, Origin, Step};
 use crate::system::{Overlay, Reversibility, System, Undo};
 use footprint::{Footprint, Saved, Slot};
@@ -38,26 +39,16 @@ impl PlanContext {
     }
 }
 
-/// The stage a step belongs to. Stages are barriers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum PlanStage {
-    /// The pre-state list.
-    Pre,
-    /// The changes.
-    Changes,
-    /// The post-state list.
-    Post,
-}
-
-impl PlanStage {
-    /// As it is shown.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Pre => "pre",
-            Self::Changes => "changes",
-            Self::Post => "post",
-        }
+words! {
+    /// The stage a step belongs to. Stages are barriers.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+    pub enum PlanStage by word {
+        /// The pre-state list.
+        Pre = "pre",
+        /// The changes.
+        Changes = "changes",
+        /// The post-state list.
+        Post = "post",
     }
 }
 

@@ -7,30 +7,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 fn port(direction: Direction, ty: &str, unit: Option<&str>, buffered: bool) -> PortType {
-    let ty = ty.parse().unwrap();
-    PortType {
-        direction,
-        ty,
-        unit: unit.map(Arc::from),
-        buffered,
-        required: false,
-        doc: String::new(),
-        origin: Origin(90),
-    }
+    let port = PortType::new(direction, ty.parse().unwrap());
+    PortType { unit: unit.map(Arc::from), buffered, origin: Origin(90), ..port }
 }
 
 fn property(ty: &str, default: Option<Value>, tunable: Tunable) -> PropertyType {
-    let ty = ty.parse().unwrap();
-    PropertyType {
-        ty,
-        default,
-        min: Some(0.0),
-        max: Some(10.0),
-        tunable,
-        unit: None,
-        doc: String::new(),
-        origin: Origin(91),
-    }
+    let property = PropertyType::new(ty.parse().unwrap(), tunable);
+    PropertyType { default, min: Some(0.0), max: Some(10.0), origin: Origin(91), ..property }
 }
 
 fn operation(effect: Effect) -> OperationType {

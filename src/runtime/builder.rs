@@ -14,7 +14,7 @@ use crate::model::finding::count;
 use crate::model::monitor::Condition;
 use crate::model::{
     ComponentType, Direction, Effect, EventName, GENERIC_INJECTIONS, Ident, InjectionParameter, InjectionType,
-    OperationType, Origin, PortType, PropertyType, Transition, Tunable, Value, ValueType,
+    OperationType, PortType, PropertyType, Transition, Tunable, Value, ValueType,
 };
 use std::sync::Arc;
 
@@ -382,15 +382,8 @@ impl<C> Description<C> {
     fn port(&mut self, name: &str, direction: Direction, ty: ValueType) {
         let words = std::mem::take(&mut self.words);
         let name = ident(name);
-        let port = PortType {
-            direction,
-            ty,
-            unit: words.unit,
-            buffered: words.buffered,
-            required: words.required,
-            doc: words.doc,
-            origin: Origin::NONE,
-        };
+        let MemberWords { unit, buffered, required, doc, .. } = words;
+        let port = PortType { unit, buffered, required, doc, ..PortType::new(direction, ty) };
         assert!(self.ty.ports.insert(name, port).is_none(), "{}: `{name}` is declared twice", self.ty.name);
         self.ports.push(name);
     }
@@ -398,16 +391,9 @@ impl<C> Description<C> {
     fn property(&mut self, name: &str, default: Option<Value>, ty: ValueType, limits: Option<(f64, f64)>) {
         let words = std::mem::take(&mut self.words);
         let name = ident(name);
-        let mut property = PropertyType {
-            ty,
-            default: None,
-            min: words.min.or(limits.map(|l| l.0)),
-            max: words.max.or(limits.map(|l| l.1)),
-            tunable: words.tunable,
-            unit: words.unit,
-            doc: words.doc,
-            origin: Origin::NONE,
-        };
+        let (min, max) = limits.unzip();
+        let (min, max, unit, doc) = (words.min.or(min), words.max.or(max), words.unit, words.doc);
+        let mut property = PropertyType { min, max, unit, doc, ..PropertyType::new(ty, words.tunable) };
         property.default = default.map(|value| match property.fit(value) {
             Ok(value) => value,
             Err(error) => panic!("{}: the default of `{name}`: {error}", self.ty.name),
@@ -422,7 +408,7 @@ impl<C> Description<C> {
         let effect = words.effect.unwrap_or(Effect::Irreversible);
         let (moves, settled_by) = (words.moves, words.settled_by);
         let operation =
-            OperationType { args, returns, effect, moves, settled_by, doc: words.doc, origin: Origin::NONE };
+            OperationType { args, returns, moves, settled_by, doc: words.doc, ..OperationType::new(effect) };
         assert!(self.ty.operations.insert(name, operation).is_none(), "{}: `{name}` is declared twice", self.ty.name);
         self.operations.push((name, f));
     }

@@ -8,6 +8,7 @@ use crate::configurator::{StepEnd, StepName};
 use crate::coordinator::Dropped;
 use crate::limits;
 use crate::model::Snapshot;
+use crate::model::words::words;
 use serde::ser::SerializeStruct;
 use serde::{Deserialize, Serialize, Serializer};
 use std::collections::BTreeMap;
@@ -175,15 +176,10 @@ pub struct StepTime {
 /// `{"step": "undo: start A", "outcome": "not done", "took_us": 1.5}`; without `took_us` where it was not measured.
 impl Serialize for StepTime {
     fn serialize<S: Serializer>(&self, s: S) -> Result<S::Ok, S::Error> {
-        let outcome = match self.end {
-            StepEnd::Done => "done",
-            StepEnd::NotDone => "not done",
-            StepEnd::Unknown => "unknown",
-        };
         let undo = if self.undoing { "undo: " } else { "" };
         let mut fields = s.serialize_struct("StepTime", 2 + usize::from(self.took.is_some()))?;
         fields.serialize_field("step", &format_args!("{undo}{}", self.step))?;
-        fields.serialize_field("outcome", outcome)?;
+        fields.serialize_field("outcome", &self.end)?;
         match self.took {
             Some(took) => fields.serialize_field("took_us", &(took.as_secs_f64() * 1e6))?,
             None => fields.skip_field("took_us")?,
@@ -192,32 +188,21 @@ impl Serialize for StepTime {
     }
 }
 
-/// Where a deployment is in its life.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Phase {
-    /// Being brought up.
-    Deploying,
-    /// Up.
-    Up,
-    /// Being taken down.
-    ShuttingDown,
-    /// Down: nothing is left.
-    Down,
-    /// Neither: something could not be undone.
-    Broken,
-}
-
-impl Phase {
-    /// Its name in views.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Deploying => "deploying",
-            Self::Up => "up",
-            Self::ShuttingDown => "shutting_down",
-            Self::Down => "down",
-            Self::Broken => "broken",
-        }
+words! {
+    /// Where a deployment is in its life.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Deserialize)]
+    #[serde(rename_all = "snake_case")]
+    pub enum Phase by as_str {
+        /// Being brought up.
+        Deploying = "deploying",
+        /// Up.
+        Up = "up",
+        /// Being taken down.
+        ShuttingDown = "shutting_down",
+        /// Down: nothing is left.
+        Down = "down",
+        /// Neither: something could not be undone.
+        Broken = "broken",
     }
 }
 

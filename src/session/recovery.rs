@@ -122,11 +122,7 @@ pub struct Recovered {
 
 /// The word of a recovery, as it is typed.
 pub fn recovery(word: &str) -> Option<Recovery> {
-    match word {
-        "back" => Some(Recovery::Back),
-        "accept" => Some(Recovery::Accept),
-        _ => None,
-    }
+    Recovery::WORDS.iter().find(|(own, _)| *own == word).map(|(_, recovery)| *recovery)
 }
 
 /// Why nothing can be finished instead of undone.
@@ -145,11 +141,7 @@ impl Session {
     pub fn recover(&self, how: Recovery, by: &str, within: Duration) -> Option<Recovered> {
         let deadline = self.clock().now() + within;
         let was_broken = self.configurator().view(false, deadline)?.broken.is_some();
-        let word = match how {
-            Recovery::Back => "back",
-            Recovery::Accept => "accept",
-        };
-        self.hub().note(Happening::Requested { request: None, ask: format!("recover --{word}"), by: by.to_owned() });
+        self.hub().note(Happening::Requested { request: None, ask: format!("recover --{how}"), by: by.to_owned() });
         let ended = self.configurator().recover(how, deadline)?;
         self.refresh_phase();
         let residual = ended.err();

@@ -10,7 +10,7 @@ use crate::configurator::{Answer, Batch, ConfiguratorHandle, Progress, Reason, R
 use crate::coordinator::{ChartTrouble, Class, CoordinatorHandle, Delivered, Incoming, Listener, NotAccepted, Tag};
 use crate::model::{Ask, Deployment, EventName, FAULTED, Ident, Precedence, RequestId, Verdict};
 use crate::platform::PlatformEvent;
-use crate::statechart::{Chart, EventId, FunctionOutput, NodeId, Printer, Raised};
+use crate::statechart::{Chart, EventId, FunctionOutput, NodeId, Raised};
 use crate::time::lock;
 use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
@@ -263,13 +263,7 @@ impl Listener for ToConfigurator {
     }
 
     fn said(&mut self, said: &FunctionOutput) {
-        let by = match said.by {
-            Printer::Err => "err",
-            Printer::Warn => "warn",
-            Printer::Info => "info",
-            Printer::Dbg => "dbg",
-        };
-        self.hub.note(Happening::Said { by, text: said.text.clone() });
+        self.hub.note(Happening::Said { by: said.by.word(), text: said.text.clone() });
     }
 
     fn ended(&mut self, why: &str) {

@@ -55,6 +55,11 @@ impl RpcError {
     pub fn new(code: i64, message: impl Into<String>) -> Self {
         Self { code, message: message.into(), data: Json::Null }
     }
+
+    /// An error with what to do about it.
+    pub fn helped(code: i64, message: impl Into<String>, help: impl Into<String>) -> Self {
+        Self { data: json!({ "help": help.into() }), ..Self::new(code, message) }
+    }
 }
 
 fn given<'de, D: serde::Deserializer<'de>>(id: D) -> Result<Option<Json>, D::Error> {
@@ -107,11 +112,10 @@ pub fn only(method: &str, params: &Json, known: &[&str]) -> Result<(), RpcError>
     };
     match given.keys().find(|name| !known.contains(&name.as_str())) {
         None => Ok(()),
-        Some(name) => Err(RpcError {
-            code: INVALID_PARAMS,
-            message: format!("`{method}` has no parameter `{name}`"),
-            data: json!({ "help": did_you_mean(name, "parameters", known.iter().copied()) }),
-        }),
+        Some(name) => {
+            let message = format!("`{method}` has no parameter `{name}`");
+            Err(RpcError::helped(INVALID_PARAMS, message, did_you_mean(name, "parameters", known.iter().copied())))
+        }
     }
 }
 

@@ -43,11 +43,10 @@ pub const METHODS: &[(&str, &[&str])] = &[
 fn known(method: &str, params: &Json) -> Result<(), RpcError> {
     match METHODS.iter().find(|(name, _)| *name == method) {
         Some((_, parameters)) => only(method, params, parameters),
-        None => Err(RpcError {
-            code: METHOD_NOT_FOUND,
-            message: format!("there is no method `{method}`"),
-            data: json!({ "help": did_you_mean(method, "methods", METHODS.iter().map(|(name, _)| *name)) }),
-        }),
+        None => {
+            let near = did_you_mean(method, "methods", METHODS.iter().map(|(name, _)| *name));
+            Err(RpcError::helped(METHOD_NOT_FOUND, format!("there is no method `{method}`"), near))
+        }
     }
 }
 
@@ -82,7 +81,7 @@ fn within_at_most(params: &Json, usual: f64, most: f64) -> Result<Duration, RpcE
 }
 
 fn refused(message: String, help: String) -> RpcError {
-    RpcError { code: REFUSED, message, data: json!({ "help": help }) }
+    RpcError::helped(REFUSED, message, help)
 }
 
 fn view(value: &impl serde::Serialize) -> Json {
@@ -202,19 +201,17 @@ fn refused_while_stopping(session: &Session, method: &str, params: &Json) -> Res
         _ => return Ok(()),
     };
     let deployment = session.deployment();
-    Err(RpcError {
-        code: GOING_DOWN,
-        message: format!("`{}` is being stopped: {what} is refused", deployment.name),
-        data: json!({ "help": format!(
-            "safety events, `{}` and `recover` stay open; `davit status` shows what it waits for",
-            deployment.shutdown.event
-        ) }),
-    })
+    let message = format!("`{}` is being stopped: {what} is refused", deployment.name);
+    let help = format!(
+        "safety events, `{}` and `recover` stay open; `davit status` shows what it waits for",
+        deployment.shutdown.event
+    );
+    Err(RpcError::helped(GOING_DOWN, message, help))
 }
 
 fn unanswered(why: Unanswered) -> RpcError {
     let help = "something may be under way that holds it up: `davit status` shows what is known";
-    RpcError { data: json!({ "help": help }), ..RpcError::new(TIMED_OUT, why.to_string()) }
+    RpcError::helped(TIMED_OUT, why.to_string(), help)
 }
 
 fn no_member(why: NoMember) -> RpcError {
@@ -304,14 +301,10 @@ fn not_raised(why: NotRaised) -> RpcError {
 }
 
 fn drift(session: &Session, params: &Json) -> Result<Json, RpcError> {
-    match session.drift(within_at_most(params, WITHIN, limits::READ_WITHIN)?) {
-        Some(differences) => Ok(view(&differences)),
-        None => Err(RpcError {
-            code: TIMED_OUT,
-            message: "the platform could not be read in time".to_owned(),
-            data: json!({ "help": "something may be under way, or a component keeps it busy: `davit status` shows it" }),
-        }),
-    }
+    let drift = session.drift(within_at_most(params, WITHIN, limits::READ_WITHIN)?);
+    let help = "something may be under way, or a component keeps it busy: `davit status` shows it";
+    let late = || RpcError::helped(TIMED_OUT, "the platform could not be read in time", help);
+    drift.map(|differences| view(&differences)).ok_or_else(late)
 }
 
 fn recover(session: &Session, params: &Json) -> Result<Json, RpcError> {
@@ -326,12 +319,8 @@ fn recover(session: &Session, params: &Json) -> Result<Json, RpcError> {
     let within = within_at_most(params, WITHIN, limits::RECOVER_WITHIN)?;
     let recovered = session.recover(how, "operator", within);
     recovered.map(|recovered| view(&recovered)).ok_or_else(|| {
-        let message = "the recovery was not over in time; it goes on".to_owned();
-        RpcError {
-            code: TIMED_OUT,
-            message,
-            data: json!({ "help": "`davit status` and `davit log` show how it ends" }),
-        }
+        let message = "the recovery was not over in time; it goes on";
+        RpcError::helped(TIMED_OUT, message, "`davit status` and `davit log` show how it ends")
     })
 }
 

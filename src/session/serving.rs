@@ -108,13 +108,8 @@ pub(super) struct ServingShared {
 
 /// The answer to one that finds all places taken.
 pub(super) fn too_many() -> RpcError {
-    RpcError {
-        code: rpc::TOO_MANY,
-        message: "too many connections".to_owned(),
-        data: serde_json::json!({
-            "help": "close one and try again; `davit status`, `davit shutdown` and safety events are answered all the same"
-        }),
-    }
+    let help = "close one and try again; `davit status`, `davit shutdown` and safety events are answered all the same";
+    RpcError::helped(rpc::TOO_MANY, "too many connections", help)
 }
 
 /// Answers the calls of one connection until it closes. `kept`: it has one of the places kept for what must get through.

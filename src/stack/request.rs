@@ -1,6 +1,7 @@
 //! What is asked of a configurator: requests, who makes them, and which belong together (semantics: *Requests*).
 
 use crate::model::names::is_within;
+use crate::model::words::sent_as_shown;
 use crate::model::{Ask, ComponentName, ConfigId, Ident, OPERATOR, RequestId};
 use smallvec::SmallVec;
 use std::fmt;
@@ -27,11 +28,7 @@ impl fmt::Display for Requester {
     }
 }
 
-impl serde::Serialize for Requester {
-    fn serialize<S: serde::Serializer>(&self, s: S) -> Result<S::Ok, S::Error> {
-        s.collect_str(self)
-    }
-}
+sent_as_shown!(Requester);
 
 /// The number of a frame; never used again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize)]

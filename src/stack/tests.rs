@@ -1,10 +1,13 @@
 //! What the laws leave to examples: groups, floors, hand-over, the bound, failed components.
 
-use super::{FrameId, Op, Planned, Requester, Scope, Stack, Switch, transaction};
+use super::{
+    FrameId, Group, Op, Planned, PushesOf, Request, Requester, Rules, Scope, Stack, Switch, World, take_up, transaction,
+};
 use crate::model::*;
 use crate::plan::{PlanContext, Refusal};
 use crate::system::{System, View, step};
 use crate::time::Time;
+use rustc_hash::FxHashSet;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -23,16 +26,8 @@ fn member(text: &str) -> MemberRef {
 fn types() -> Arc<Catalogue> {
     let mut ty = ComponentType::new("t.Arm", "an arm");
     for (name, tunable) in [("gain", Tunable::Always), ("mass", Tunable::Stopped)] {
-        let property = PropertyType {
-            ty: ValueType::Float,
-            default: Some(Value::Float(0.0)),
-            min: None,
-            max: None,
-            tunable,
-            unit: None,
-            doc: String::new(),
-            origin: Origin::NONE,
-        };
+        let property = PropertyType::new(ValueType::Float, tunable);
+        let property = PropertyType { default: Some(Value::Float(0.0)), ..property };
         ty.properties.insert(ident(name), property);
     }
     for (name, effect) in
@@ -92,7 +87,34 @@ fn create(name: &str, ty: &str) -> ChangeKind {
 }
 
 fn push(configuration: &Configuration) -> Op<'_> {
-    Op::Push { configuration, requester: Requester::Operator, at: Time(0), scope: None }
+    push_by(configuration, Requester::Operator)
+}
+
+fn push_by(configuration: &Configuration, requester: Requester) -> Op<'_> {
+    Op::Push { configuration, requester, at: Time(0), scope: None }
+}
+
+/// What becomes of requests of one batch.
+fn taken_up(
+    world: &World,
+    requests: &[Request],
+    configurations: &[Configuration],
+    joined: bool,
+    pushes: Option<PushesOf<'_>>,
+) -> Group {
+    let rules = Rules {
+        configurations: &configurations.iter().map(|configuration| (configuration.id, configuration.clone())).collect(),
+        context: &PlanContext::default(),
+        at: Time(0),
+        held: &[],
+        places: &[],
+        operator: &FxHashSet::default(),
+        joined,
+        placed: false,
+        alone: None,
+        pushes,
+    };
+    take_up(world, requests, &rules)
 }
 
 impl Bench {
@@ -287,24 +309,10 @@ fn an_undo_by_leaving_a_state_that_is_refused_leaves_a_frame_like_others() {
     let scope = Some(Scope(7));
     bench.ok(&[Op::Push { configuration: &low, requester: Requester::Operator, at: Time(0), scope }]);
     bench.ok(&[push(&high)]);
-    let configurations = [low, high].into_iter().map(|c| (c.id, c)).collect();
-    let context = PlanContext::default();
-    let rules = super::Rules {
-        configurations: &configurations,
-        context: &context,
-        at: Time(0),
-        held: &[],
-        places: &[],
-        operator: &rustc_hash::FxHashSet::default(),
-        joined: false,
-        placed: false,
-        alone: None,
-        pushes: None,
-    };
     let ask = Ask::UndoOf(ConfigId::new("low").unwrap());
-    let undo = super::Request { scope, ..super::Request::new(RequestId(1), ask, Requester::Operator) };
-    let world = super::World::new(bench.system.clone(), bench.stack.clone());
-    let group = super::take_up(&world, &[undo], &rules);
+    let undo = Request { scope, ..Request::new(RequestId(1), ask, Requester::Operator) };
+    let world = World::new(bench.system.clone(), bench.stack.clone());
+    let group = taken_up(&world, &[undo], &[low, high], false, None);
     assert_eq!(group.told[0].verdict, Some(Verdict::UndoFailed), "`high` needs it stopped");
     let frame = bench.stack.frames()[0].id;
     assert_eq!(group.stay[..], [(0, frame)]);
@@ -321,24 +329,10 @@ fn an_undo_by_leaving_a_state_is_about_the_visit_that_was_left() {
         bench.ok(&[Op::Push { configuration, requester: Requester::Operator, at: Time(0), scope }]);
     }
     let ids: Vec<FrameId> = bench.stack.frames().iter().map(|frame| frame.id).collect();
-    let configurations = std::iter::once((later.id, later)).collect();
-    let context = PlanContext::default();
-    let rules = super::Rules {
-        configurations: &configurations,
-        context: &context,
-        at: Time(0),
-        held: &[],
-        places: &[],
-        operator: &rustc_hash::FxHashSet::default(),
-        joined: false,
-        placed: false,
-        alone: None,
-        pushes: None,
-    };
     let ask = Ask::UndoOf(ConfigId::new("mass").unwrap());
-    let undo = super::Request { scope, ..super::Request::new(RequestId(1), ask, Requester::Operator) };
-    let mut world = super::World::new(bench.system.clone(), bench.stack.clone());
-    let planned = super::take_up(&world, &[undo], &rules).planned.expect("nothing is in its way");
+    let undo = Request { scope, ..Request::new(RequestId(1), ask, Requester::Operator) };
+    let mut world = World::new(bench.system.clone(), bench.stack.clone());
+    let planned = taken_up(&world, &[undo], &[later], false, None).planned.expect("nothing is in its way");
     assert_eq!(planned.parts[0].edits.pops.iter().map(|(id, _)| *id).collect::<Vec<_>>(), ids[..1]);
     assert_eq!(world.of_visit(&undo), Some(ids[0]));
     assert_eq!(world.left_with(&undo, &ids[..1]), Some(ids[1]), "the first is being undone: this is about the next");
@@ -355,7 +349,7 @@ fn what_has_given_up_a_request_goes_with_its_answer() {
     };
     let all = [configuration("a"), configuration("b"), configuration("c")];
     let claims = super::claims::Claims::new(all.iter(), &Catalogue::new());
-    let request = |ask| super::Request::new(RequestId(0), ask, Requester::Operator);
+    let request = |ask| Request::new(RequestId(0), ask, Requester::Operator);
     let (apply, undo) = (|n: usize| request(Ask::Apply(all[n].id)), |n: usize| request(Ask::UndoOf(all[n].id)));
     let under_way = || {
         let mut desk = super::Desk::default();
@@ -402,13 +396,12 @@ fn what_stands_in_the_way_goes_along_where_a_safe_configuration_keeps_what_would
     for safe in [false, true] {
         let mut bench = Bench::new(64);
         let hold = Configuration { safe, ..hold.clone() };
-        let by = |configuration, requester| Op::Push { configuration, requester, at: Time(0), scope: None };
-        bench.ok(&[by(&lower, coordinator)]);
-        bench.ok(&[by(&hold, coordinator)]);
-        bench.ok(&[by(&both, Requester::Operator)]);
-        let world = super::World::new(bench.system.clone(), bench.stack.clone());
+        bench.ok(&[push_by(&lower, coordinator)]);
+        bench.ok(&[push_by(&hold, coordinator)]);
+        bench.ok(&[push_by(&both, Requester::Operator)]);
+        let world = World::new(bench.system.clone(), bench.stack.clone());
         let frames = bench.stack.frames();
-        let undo = super::Request::new(RequestId(1), Ask::UndoOf(lower.id), coordinator);
+        let undo = Request::new(RequestId(1), Ask::UndoOf(lower.id), coordinator);
         let along = super::leave::along(&world, frames, &undo, frames[0].id, (super::LedDown::Whole, false));
         match safe {
             true => assert_eq!(along.unwrap()[..], [frames[2].id]),

@@ -5,6 +5,7 @@ use super::wide::Wide;
 use crate::model::finding::Origin;
 use crate::model::names::{EventName, Ident};
 use crate::model::statechart::FunctionId;
+use crate::model::words::words;
 use rustc_hash::FxHashMap;
 use std::fmt;
 
@@ -35,7 +36,7 @@ impl EdgeId {
 
 /// An event as a chart knows it: dense for those that some transition lists, one common id for all others from outside,
 /// and one for each completion that no transition lists.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
 pub struct EventId(pub(super) u32);
 
 impl EventId {
@@ -74,15 +75,17 @@ impl EventId {
     }
 }
 
-/// What a node is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum NodeKind {
-    /// A state without child nodes.
-    Leaf,
-    /// A state with child nodes.
-    Composite,
-    /// A connector.
-    Connector,
+words! {
+    /// What a node is.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+    pub enum NodeKind by word {
+        /// A state without child nodes.
+        Leaf = "leaf",
+        /// A state with child nodes.
+        Composite = "composite",
+        /// A connector.
+        Connector = "connector",
+    }
 }
 
 /// A piece `start..start + len` of another table.
@@ -197,7 +200,7 @@ pub struct RaiseSite {
 }
 
 /// A compiled statechart.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Chart {
     pub(super) nodes: Vec<NodeRow>,
     pub(super) edges: Vec<EdgeRow>,

@@ -6,6 +6,7 @@ use super::trace::Trace;
 use super::{EdgeId, EventId};
 use crate::model::names::EventName;
 use crate::model::statechart::FunctionId;
+use crate::model::words::words;
 use std::sync::Arc;
 
 /// A name raised by an entry, an exit or an effect.
@@ -199,17 +200,19 @@ pub struct FunctionOutput {
     pub text: String,
 }
 
-/// rFSM's four printers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Printer {
-    /// Errors, among them those that functions raise.
-    Err,
-    /// Warnings.
-    Warn,
-    /// All else.
-    Info,
-    /// For those who look for a fault.
-    Dbg,
+words! {
+    /// rFSM's four printers.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+    pub enum Printer by word {
+        /// Errors, among them those that functions raise.
+        Err = "err",
+        /// Warnings.
+        Warn = "warn",
+        /// All else.
+        Info = "info",
+        /// For those who look for a fault.
+        Dbg = "dbg",
+    }
 }
 
 /// Functions with somebody who watches: `watcher` sees what happens, `functions` decide and act.
@@ -232,24 +235,39 @@ impl<W: Hook, F: Hook> Watched<'_, W, F> {
     }
 }
 
+/// Methods that only the functions have an answer to.
+macro_rules! passed_on {
+    ($($name:ident($($arg:ident: $ty:ty),*) $(-> $answer:ty)?;)*) => {$(
+        fn $name(&mut self, $($arg: $ty),*) $(-> $answer)? {
+            self.functions.$name($($arg),*)
+        }
+    )*};
+}
+
 impl<W: Hook, F: Hook> Hook for Watched<'_, W, F> {
     const MICROSTEPS: bool = W::MICROSTEPS || F::MICROSTEPS;
     const WATCHES: bool = W::WATCHES || F::WATCHES;
 
-    fn event(&mut self, chart: &Chart, name: EventName) -> EventId {
-        self.functions.event(chart, name)
+    passed_on! {
+        event(chart: &Chart, name: EventName) -> EventId;
+        seconds(function: FunctionId, state: NodeId, view: &mut HookContext<'_>) -> Option<f64>;
+        said(said: &mut Vec<FunctionOutput>);
+        trace(what: Trace<'_>, view: &mut HookContext<'_>);
+        poll(queue: &mut Queue) -> bool;
+        before_step(view: &mut HookContext<'_>, events: &mut Vec<EventId>) -> bool;
+        after_step(view: &mut HookContext<'_>);
+        guard(function: FunctionId, edge: EdgeId, view: &mut HookContext<'_>) -> bool;
+        predicate(function: FunctionId, event: EventId, view: &mut HookContext<'_>) -> bool;
+        action(function: FunctionId, place: ActionPlace, view: &mut HookContext<'_>);
+        doo_reset(state: NodeId);
+        doo(function: FunctionId, state: NodeId, view: &mut HookContext<'_>) -> Doo;
+        no_way(chart: &Chart, from: NodeId);
+        grown(chart: &Chart, queue: &mut Queue) -> Option<Arc<Chart>>;
+        go_on() -> bool;
     }
 
     fn event_text(&self, chart: &Chart, event: EventId) -> String {
         self.functions.event_text(chart, event)
-    }
-
-    fn seconds(&mut self, function: FunctionId, state: NodeId, view: &mut HookContext<'_>) -> Option<f64> {
-        self.functions.seconds(function, state, view)
-    }
-
-    fn said(&mut self, said: &mut Vec<FunctionOutput>) {
-        self.functions.said(said);
     }
 
     fn lost(&self) -> u64 {
@@ -262,10 +280,6 @@ impl<W: Hook, F: Hook> Hook for Watched<'_, W, F> {
 
     fn traces(&self) -> bool {
         self.functions.traces()
-    }
-
-    fn trace(&mut self, what: Trace<'_>, view: &mut HookContext<'_>) {
-        self.functions.trace(what, view);
     }
 
     fn entered(&mut self, chart: &Chart, state: NodeId) {
@@ -301,50 +315,6 @@ impl<W: Hook, F: Hook> Hook for Watched<'_, W, F> {
     fn not_entered(&mut self, chart: &Chart) {
         self.watcher.not_entered(chart);
         self.functions.not_entered(chart);
-    }
-
-    fn poll(&mut self, queue: &mut Queue) -> bool {
-        self.functions.poll(queue)
-    }
-
-    fn before_step(&mut self, view: &mut HookContext<'_>, events: &mut Vec<EventId>) -> bool {
-        self.functions.before_step(view, events)
-    }
-
-    fn after_step(&mut self, view: &mut HookContext<'_>) {
-        self.functions.after_step(view);
-    }
-
-    fn guard(&mut self, function: FunctionId, edge: EdgeId, view: &mut HookContext<'_>) -> bool {
-        self.functions.guard(function, edge, view)
-    }
-
-    fn predicate(&mut self, function: FunctionId, event: EventId, view: &mut HookContext<'_>) -> bool {
-        self.functions.predicate(function, event, view)
-    }
-
-    fn action(&mut self, function: FunctionId, place: ActionPlace, view: &mut HookContext<'_>) {
-        self.functions.action(function, place, view);
-    }
-
-    fn doo_reset(&mut self, state: NodeId) {
-        self.functions.doo_reset(state);
-    }
-
-    fn doo(&mut self, function: FunctionId, state: NodeId, view: &mut HookContext<'_>) -> Doo {
-        self.functions.doo(function, state, view)
-    }
-
-    fn go_on(&mut self) -> bool {
-        self.functions.go_on()
-    }
-
-    fn no_way(&mut self, chart: &Chart, from: NodeId) {
-        self.functions.no_way(chart, from);
-    }
-
-    fn grown(&mut self, chart: &Chart, queue: &mut Queue) -> Option<Arc<Chart>> {
-        self.functions.grown(chart, queue)
     }
 
     fn runaway(&mut self, chart: &Chart, connector: NodeId) {

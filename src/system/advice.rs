@@ -1,10 +1,10 @@
 //! What a user reads of a violation: one text, whoever found it.
 
-use super::violation::MemberClass;
 use super::{View, Violation};
 use crate::model::finding::did_you_mean;
 use crate::model::{
-    ComponentName, ComponentType, Finding, Ident, MemberRef, Origin, Resource, Tunable, TypeName, ValueType,
+    ComponentName, ComponentType, Finding, Ident, MemberClass, MemberRef, Origin, Resource, Tunable, TypeName,
+    ValueType,
 };
 
 impl Violation {
@@ -26,52 +26,28 @@ impl Violation {
         match self {
             Self::UnknownType { component, .. } => format!("`{component}` would be one"),
             Self::UnknownActivity { .. } => "runs in an activity that the deployment does not declare".to_owned(),
-            Self::UnknownMember { what, .. } => format!("no such {}", what.words().0),
+            Self::UnknownMember { what, .. } => format!("no such {what}"),
             _ => String::new(),
         }
     }
 
     /// Where what it is about was declared.
     fn declarations(&self, view: &impl View) -> Vec<(Origin, String)> {
-        let here = |declared: &Origin, how: &str| vec![(*declared, format!("declared here{how}"))];
-        match self {
-            Self::UnknownMember { types, .. } => {
-                let declared = types.iter().filter_map(|ty| view.types().get(*ty));
-                declared.map(|ty| (ty.origin, format!("{} is declared here", ty.name))).collect()
+        let of_type =
+            |ty: &TypeName| view.types().get(*ty).map(|ty| (ty.origin, format!("{} is declared here", ty.name)));
+        let how = match self {
+            Self::UnknownMember { types, .. } => return types.iter().filter_map(of_type).collect(),
+            Self::PortUnmapped { ty, .. } => return of_type(ty).into_iter().collect(),
+            Self::MissingProperty { .. } => " without a default",
+            Self::NeedsBuffer { .. } => " as buffered",
+            _ => "",
+        };
+        match self.kind().2 {
+            [Some((_, declared)), None] => vec![(declared, format!("declared here{how}"))],
+            both => {
+                let both = both.into_iter().flatten();
+                both.map(|(member, declared)| (declared, format!("`{member}` is declared here"))).collect()
             }
-            Self::PortTypes { from, to, .. } | Self::PortUnits { from, to, .. } | Self::PortUnlike { from, to, .. } => {
-                [from, to].map(|(port, declared)| (*declared, format!("`{port}` is declared here"))).to_vec()
-            }
-            Self::PortUnmapped { ty, .. } => view
-                .types()
-                .get(*ty)
-                .map(|ty| (ty.origin, format!("{} is declared here", ty.name)))
-                .into_iter()
-                .collect(),
-            Self::MissingProperty { declared, .. } => here(declared, " without a default"),
-            Self::NeedsBuffer { declared, .. } => here(declared, " as buffered"),
-            Self::NotOut { declared, .. }
-            | Self::NotIn { declared, .. }
-            | Self::WritesOut { declared, .. }
-            | Self::NotTunable { declared, .. }
-            | Self::BadValue { declared, .. }
-            | Self::NotWritable { declared, .. }
-            | Self::ArgumentCount { declared, .. }
-            | Self::Argument { declared, .. } => here(declared, ""),
-            Self::UnknownComponent(_)
-            | Self::UnknownType { .. }
-            | Self::UnknownActivity { .. }
-            | Self::Exists(_)
-            | Self::Transition { .. }
-            | Self::ResourceHeld { .. }
-            | Self::NotUnconfigured { .. }
-            | Self::StillConnected { .. }
-            | Self::AlreadyConnected { .. }
-            | Self::NotConnected { .. }
-            | Self::DataAlone { .. }
-            | Self::BufferSize(_)
-            | Self::Driven { .. }
-            | Self::PropertyCount { .. } => Vec::new(),
         }
     }
 
@@ -163,14 +139,14 @@ impl Violation {
 /// What may have been meant by a member that none of `types` has.
 fn near_member(what: MemberClass, member: MemberRef, types: &[&ComponentType]) -> String {
     let name = member.member;
-    let others = MemberClass::ALL.into_iter().filter(|other| *other != what);
-    let elsewhere = others.flat_map(|other| types.iter().map(move |ty| (other, *ty)));
-    if let Some((other, ty)) = elsewhere.into_iter().find(|(other, ty)| other.is_in(ty, name)) {
+    let others = MemberClass::WORDS.iter().map(|(_, other)| *other).filter(|other| *other != what);
+    let mut elsewhere = others.flat_map(|other| types.iter().map(move |ty| (other, *ty)));
+    if let Some((other, ty)) = elsewhere.find(|(other, ty)| other.of(ty).contains(&name.as_str())) {
         let article = if other == MemberClass::Operation { "an" } else { "a" };
-        return format!("`{name}` is {article} {} of {}", other.words().0, ty.name);
+        return format!("`{name}` is {article} {other} of {}", ty.name);
     }
     let mut known: Vec<&str> = types.iter().flat_map(|ty| what.of(ty)).collect();
     known.sort_unstable();
     known.dedup();
-    did_you_mean(name.as_str(), what.words().1, known)
+    did_you_mean(name.as_str(), what.several(), known)
 }

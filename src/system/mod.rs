@@ -17,6 +17,7 @@ mod system_graph;
 pub mod touch;
 mod violation;
 
+pub use crate::model::MemberClass;
 pub use diff::{diff, moves_any};
 pub use node::{ComponentNode, Driven, Link, Written};
 pub use overlay::Overlay;
@@ -26,7 +27,7 @@ pub use so::is_so;
 pub use step::{Reversibility, Undo};
 pub use system_graph::{System, UnknownType};
 pub use touch::{Access, Slot, Touch};
-pub use violation::{MemberClass, Violation, either};
+pub use violation::{Violation, either};
 
 use crate::model::{Catalogue, ComponentName, MemberRef, Policy, RunState, Value};
 

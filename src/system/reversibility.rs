@@ -1,13 +1,16 @@
 //! How far a step can be undone, as a word.
 
-/// How far a step can be undone.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Reversibility {
-    /// Its inverse restores the observable state.
-    Exact,
-    /// Another call makes good for it.
-    Compensated,
-    /// Nothing undoes it.
-    Irreversible,
+use crate::model::words::words;
+
+words! {
+    /// How far a step can be undone.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+    pub enum Reversibility by word {
+        /// Its inverse restores the observable state.
+        Exact = "exact",
+        /// Another call makes good for it.
+        Compensated = "compensated",
+        /// Nothing undoes it.
+        Irreversible = "irreversible",
+    }
 }

@@ -3,52 +3,9 @@
 use crate::model::codes::{self, Code};
 use crate::model::finding::{are, count};
 use crate::model::{
-    ComponentName, ComponentType, Ident, MemberRef, Origin, RunState, Transition, Tunable, TypeName, Value, ValueType,
+    ComponentName, Ident, MemberClass, MemberRef, Origin, RunState, Transition, Tunable, TypeName, Value, ValueType,
 };
 use std::sync::Arc;
-
-/// A kind of what components have.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum MemberClass {
-    /// A port.
-    Port,
-    /// A property.
-    Property,
-    /// An operation.
-    Operation,
-}
-
-impl MemberClass {
-    /// All of them.
-    pub const ALL: [Self; 3] = [Self::Port, Self::Property, Self::Operation];
-
-    /// What it is called: one, and several.
-    pub fn words(self) -> (&'static str, &'static str) {
-        match self {
-            Self::Port => ("port", "ports"),
-            Self::Property => ("property", "properties"),
-            Self::Operation => ("operation", "operations"),
-        }
-    }
-
-    /// Whether a type has one of that name.
-    pub fn is_in(self, ty: &ComponentType, name: Ident) -> bool {
-        match self {
-            Self::Port => ty.ports.contains_key(&name),
-            Self::Property => ty.properties.contains_key(&name),
-            Self::Operation => ty.operations.contains_key(&name),
-        }
-    }
-
-    /// The names of those that a type has.
-    pub fn of(self, ty: &ComponentType) -> Vec<&'static str> {
-        match self {
-            Self::Port => ty.ports.keys().map(Ident::as_str).collect(),
-            Self::Property => ty.properties.keys().map(Ident::as_str).collect(),
-            Self::Operation => ty.operations.keys().map(Ident::as_str).collect(),
-        }
-    }
-}
 
 /// A false precondition of a step, or of what is made into one. `declared` is where the member at fault was declared.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -71,7 +28,7 @@ pub enum Violation {
     #[error("`{component}` still has connections: {}", list(links))]
     StillConnected { component: ComponentName, links: Vec<(MemberRef, MemberRef)> },
     /// `types` are all that the component may be of. The member alone is quoted: a finding points at what it quotes first.
-    #[error("{} ({}) has no {} `{}`", member.component, either(types), what.words().0, member.member)]
+    #[error("{} ({}) has no {} `{}`", member.component, either(types), what, member.member)]
     UnknownMember { what: MemberClass, member: MemberRef, types: Vec<TypeName> },
     #[error("`{port}` is an in-port; a connection begins at an out-port")]
     NotOut { port: MemberRef, declared: Origin },
@@ -167,72 +124,64 @@ pub(super) fn brief(value: &Value) -> String {
 impl Violation {
     /// The stable code.
     pub fn code(&self) -> Code {
-        match self {
-            Self::UnknownComponent(_) => codes::UNKNOWN_COMPONENT,
-            Self::UnknownType { .. } => codes::UNKNOWN_TYPE,
-            Self::UnknownActivity { .. } => codes::UNKNOWN_ACTIVITY,
-            Self::Exists(_) => codes::COMPONENT_EXISTS,
-            Self::Transition { .. } => codes::ILLEGAL_TRANSITION,
-            Self::ResourceHeld { .. } => codes::RESOURCE_HELD,
-            Self::NotUnconfigured { .. } => codes::NOT_UNCONFIGURED,
-            Self::StillConnected { .. } => codes::STILL_CONNECTED,
-            Self::UnknownMember { what: MemberClass::Port, .. } => codes::UNKNOWN_PORT,
-            Self::UnknownMember { what: MemberClass::Property, .. } => codes::UNKNOWN_PROPERTY,
-            Self::UnknownMember { what: MemberClass::Operation, .. } => codes::UNKNOWN_OPERATION,
-            Self::NotOut { .. } => codes::NOT_AN_OUT_PORT,
-            Self::NotIn { .. } | Self::WritesOut { .. } => codes::NOT_AN_IN_PORT,
-            Self::PortTypes { .. } => codes::PORT_TYPES,
-            Self::PortUnits { .. } => codes::PORT_UNITS,
-            Self::AlreadyConnected { .. } => codes::ALREADY_CONNECTED,
-            Self::NotConnected { .. } => codes::NOT_CONNECTED,
-            Self::DataAlone { .. } => codes::DATA_ALONE,
-            Self::NeedsBuffer { .. } => codes::NEEDS_BUFFER,
-            Self::BufferSize(_) => codes::BUFFER_SIZE,
-            Self::NotTunable { .. } => codes::NOT_TUNABLE,
-            Self::BadValue { .. } | Self::PropertyCount { .. } => codes::BAD_VALUE,
-            Self::MissingProperty { .. } => codes::MISSING_PROPERTY,
-            Self::Driven { .. } => codes::PORT_DRIVEN,
-            Self::NotWritable { .. } => codes::PORT_NOT_WRITABLE,
-            Self::ArgumentCount { .. } | Self::Argument { .. } => codes::BAD_ARGUMENTS,
-            Self::PortUnlike { .. } => codes::PORT_UNLIKE,
-            Self::PortUnmapped { .. } => codes::PORT_UNMAPPED,
-        }
+        self.kind().0
     }
 
     /// Whether it follows from the types of the components (and the deployment's activities) alone: then it is there in
     /// every system in which they are of these types. What is not depends on what is there, in which run state, and how it
     /// is connected.
     pub fn is_of_types(&self) -> bool {
+        self.kind().1
+    }
+
+    /// What is to be known of each kind: its code, whether it follows from types alone, and the members it is about, each
+    /// with where it was declared as far as the violation knows.
+    pub(super) fn kind(&self) -> (Code, bool, [Option<(MemberRef, Origin)>; 2]) {
+        let none = [None; 2];
+        let one = |member: &MemberRef, declared: &Origin| [Some((*member, *declared)), None];
+        let bare = |member: &MemberRef| one(member, &Origin::NONE);
+        let two = |a: &MemberRef, b: &MemberRef| [a, b].map(|member| Some((*member, Origin::NONE)));
         match self {
-            Self::UnknownType { .. }
-            | Self::UnknownActivity { .. }
-            | Self::UnknownMember { .. }
-            | Self::NotOut { .. }
-            | Self::NotIn { .. }
-            | Self::WritesOut { .. }
-            | Self::PortTypes { .. }
-            | Self::PortUnits { .. }
-            | Self::NeedsBuffer { .. }
-            | Self::BufferSize(_)
-            | Self::BadValue { .. }
-            | Self::MissingProperty { .. }
-            | Self::NotWritable { .. }
-            | Self::ArgumentCount { .. }
-            | Self::Argument { .. }
-            | Self::PortUnlike { .. }
-            | Self::PropertyCount { .. } => true,
-            Self::UnknownComponent(_)
-            | Self::Exists(_)
-            | Self::Transition { .. }
-            | Self::ResourceHeld { .. }
-            | Self::NotUnconfigured { .. }
-            | Self::StillConnected { .. }
-            | Self::AlreadyConnected { .. }
-            | Self::NotConnected { .. }
-            | Self::DataAlone { .. }
-            | Self::NotTunable { .. }
-            | Self::PortUnmapped { .. }
-            | Self::Driven { .. } => false,
+            Self::UnknownComponent(_) => (codes::UNKNOWN_COMPONENT, false, none),
+            Self::UnknownType { .. } => (codes::UNKNOWN_TYPE, true, none),
+            Self::UnknownActivity { .. } => (codes::UNKNOWN_ACTIVITY, true, none),
+            Self::Exists(_) => (codes::COMPONENT_EXISTS, false, none),
+            Self::Transition { .. } => (codes::ILLEGAL_TRANSITION, false, none),
+            Self::ResourceHeld { .. } => (codes::RESOURCE_HELD, false, none),
+            Self::NotUnconfigured { .. } => (codes::NOT_UNCONFIGURED, false, none),
+            Self::StillConnected { .. } => (codes::STILL_CONNECTED, false, none),
+            Self::UnknownMember { what, member, .. } => {
+                let code = match what {
+                    MemberClass::Port => codes::UNKNOWN_PORT,
+                    MemberClass::Property => codes::UNKNOWN_PROPERTY,
+                    MemberClass::Operation => codes::UNKNOWN_OPERATION,
+                };
+                (code, true, bare(member))
+            }
+            Self::NotOut { port, declared } => (codes::NOT_AN_OUT_PORT, true, one(port, declared)),
+            Self::NotIn { port, declared } | Self::WritesOut { port, declared } => {
+                (codes::NOT_AN_IN_PORT, true, one(port, declared))
+            }
+            Self::PortTypes { from, to, .. } => (codes::PORT_TYPES, true, [Some(*from), Some(*to)]),
+            Self::PortUnits { from, to, .. } => (codes::PORT_UNITS, true, [Some(*from), Some(*to)]),
+            Self::AlreadyConnected { from, to } => (codes::ALREADY_CONNECTED, false, two(from, to)),
+            Self::NotConnected { from, to } => (codes::NOT_CONNECTED, false, two(from, to)),
+            Self::DataAlone { to, .. } => (codes::DATA_ALONE, false, bare(to)),
+            Self::NeedsBuffer { port, declared } => (codes::NEEDS_BUFFER, true, one(port, declared)),
+            Self::BufferSize(to) => (codes::BUFFER_SIZE, true, bare(to)),
+            Self::NotTunable { property, declared, .. } => (codes::NOT_TUNABLE, false, one(property, declared)),
+            Self::BadValue { slot, declared, .. } => (codes::BAD_VALUE, true, one(slot, declared)),
+            Self::PropertyCount { .. } => (codes::BAD_VALUE, true, none),
+            Self::MissingProperty { property, declared, .. } => {
+                (codes::MISSING_PROPERTY, true, one(property, declared))
+            }
+            Self::Driven { port, .. } => (codes::PORT_DRIVEN, false, bare(port)),
+            Self::NotWritable { port, declared, .. } => (codes::PORT_NOT_WRITABLE, true, one(port, declared)),
+            Self::ArgumentCount { operation, declared, .. } | Self::Argument { operation, declared, .. } => {
+                (codes::BAD_ARGUMENTS, true, one(operation, declared))
+            }
+            Self::PortUnlike { from, to, .. } => (codes::PORT_UNLIKE, true, [Some(*from), Some(*to)]),
+            Self::PortUnmapped { port, with, .. } => (codes::PORT_UNMAPPED, false, two(port, with)),
         }
     }
 
@@ -249,36 +198,7 @@ impl Violation {
 
     /// The members it is about.
     fn members(&self) -> [Option<MemberRef>; 2] {
-        match self {
-            Self::UnknownMember { member: m, .. }
-            | Self::NotOut { port: m, .. }
-            | Self::NotIn { port: m, .. }
-            | Self::WritesOut { port: m, .. }
-            | Self::NeedsBuffer { port: m, .. }
-            | Self::BufferSize(m)
-            | Self::NotTunable { property: m, .. }
-            | Self::BadValue { slot: m, .. }
-            | Self::MissingProperty { property: m, .. }
-            | Self::Driven { port: m, .. }
-            | Self::DataAlone { to: m, .. }
-            | Self::NotWritable { port: m, .. }
-            | Self::ArgumentCount { operation: m, .. }
-            | Self::Argument { operation: m, .. } => [Some(*m), None],
-            Self::PortTypes { from, to, .. } | Self::PortUnits { from, to, .. } | Self::PortUnlike { from, to, .. } => {
-                [Some(from.0), Some(to.0)]
-            }
-            Self::PortUnmapped { port, with, .. } => [Some(*port), Some(*with)],
-            Self::AlreadyConnected { from, to } | Self::NotConnected { from, to } => [Some(*from), Some(*to)],
-            Self::UnknownComponent(_)
-            | Self::UnknownType { .. }
-            | Self::UnknownActivity { .. }
-            | Self::Exists(_)
-            | Self::Transition { .. }
-            | Self::ResourceHeld { .. }
-            | Self::NotUnconfigured { .. }
-            | Self::StillConnected { .. }
-            | Self::PropertyCount { .. } => [None, None],
-        }
+        self.kind().2.map(|member| member.map(|(member, _)| member))
     }
 
     /// This violation where the component may be of the types of `other` as well.

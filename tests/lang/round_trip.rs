@@ -258,7 +258,7 @@ fn port_signal() -> impl Strategy<Value = PortSignal> {
 }
 
 fn signal() -> impl Strategy<Value = MonitoredSignal> {
-    let counter = prop::sample::select(Counter::NAMES.to_vec()).prop_map(|(_, counter)| counter);
+    let counter = prop::sample::select(Counter::WORDS.to_vec()).prop_map(|(_, counter)| counter);
     let leaf = prop_oneof![
         3 => port_signal().prop_map(SignalKind::Port),
         2 => finite().prop_map(SignalKind::Constant),
@@ -280,7 +280,7 @@ fn signal() -> impl Strategy<Value = MonitoredSignal> {
 
 fn condition() -> impl Strategy<Value = Condition> {
     use ConditionKind as K;
-    let op = || prop::sample::select(Comparison::ALL.to_vec());
+    let op = || prop::sample::select(Comparison::WORDS.to_vec()).prop_map(|(_, op)| op);
     let state =
         prop::sample::select(vec![RunState::Unconfigured, RunState::Stopped, RunState::Running, RunState::Faulted]);
     let leaf = prop_oneof![
@@ -436,7 +436,7 @@ fn deployment() -> impl Strategy<Value = Deployment> {
             let component = ComponentName::new(name.as_str()).unwrap();
             SimulatedReaction { after, delay, raise, component, origin: Origin::NONE }
         });
-    let how = prop::sample::select(FaultKind::NAMES.to_vec()).prop_map(|(_, how)| how);
+    let how = prop::sample::select(FaultKind::WORDS.to_vec()).prop_map(|(_, how)| how);
     let fault = ("(start|stop|property_set) [a-z]{1,4}(\\.[a-z])?", how, 1_u32..4, time()).prop_map(
         |(step, how, times, takes)| {
             let takes = if how == FaultKind::Slow { takes } else { Duration::ZERO };

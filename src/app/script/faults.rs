@@ -26,9 +26,9 @@ impl ScriptFaults {
     pub(super) fn add(&mut self, step: &str, how: &str, times: Option<f64>, takes: Option<f64>) -> mlua::Result<()> {
         // One blank between words, as steps are printed.
         let step = step.split_whitespace().collect::<Vec<_>>().join(" ");
-        let kind = FaultKind::NAMES.iter().find(|(word, _)| *word == how);
+        let kind = FaultKind::WORDS.iter().find(|(word, _)| *word == how);
         let how = kind.map(|(_, kind)| *kind).ok_or_else(|| {
-            let help = did_you_mean(how, "kinds of fault", FaultKind::NAMES.map(|(word, _)| word));
+            let help = did_you_mean(how, "kinds of fault", FaultKind::WORDS.iter().map(|(word, _)| *word));
             error(format!("`{how}` is no kind of fault: {help}"))
         })?;
         let takes = match (how, takes) {

@@ -2,6 +2,7 @@
 
 use crate::limits;
 use crate::model::codes::{SCRIPT_MISSED, SCRIPT_UNKNOWN_PARAMETER, TEXT_UNKNOWN_PARAMETER};
+use crate::model::words::words;
 use crate::time::{Clock, RecvError, lock};
 use serde_json::Value as Json;
 use std::io::{BufRead, BufReader};
@@ -10,31 +11,20 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-/// How a point ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum PointEnd {
-    /// All figures are within their bounds.
-    Ok,
-    /// One is not.
-    Missed,
-    /// The script failed otherwise.
-    Failed,
-    /// It was not over in time.
-    Hung,
-    /// The sweep was ended before it was over, or before it began.
-    Stopped,
-}
-
-impl PointEnd {
-    /// As it is shown.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Ok => "ok",
-            Self::Missed => "missed",
-            Self::Failed => "failed",
-            Self::Hung => "hung",
-            Self::Stopped => "stopped",
-        }
+words! {
+    /// How a point ended.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    pub enum PointEnd by word {
+        /// All figures are within their bounds.
+        Ok = "ok",
+        /// One is not.
+        Missed = "missed",
+        /// The script failed otherwise.
+        Failed = "failed",
+        /// It was not over in time.
+        Hung = "hung",
+        /// The sweep was ended before it was over, or before it began.
+        Stopped = "stopped",
     }
 }
 

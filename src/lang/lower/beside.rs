@@ -3,7 +3,7 @@
 //! A state is written `STATE`, or `COORDINATOR:STATE` where there are several coordinators. A state without a coordinator's
 //! name is meant of every coordinator that is not named with one of its own.
 
-use super::{name, names, text};
+use super::{names, own_name, text};
 use crate::lang::grammar::{DEPLOY, SHUTDOWN};
 use crate::lang::tree::{Cx, Fields, Kind, Node};
 use crate::model::finding::did_you_mean;
@@ -62,8 +62,7 @@ pub fn coordinators(cx: &mut Cx, fields: &mut Fields) -> Vec<(Option<Ident>, Str
         return out;
     };
     for entry in entries {
-        let key = Node::new(Kind::Str(entry.key.into()), entry.origin);
-        let ident = name::<Ident>(cx, &key, "a coordinator", several_row.example);
+        let ident = own_name::<Ident>(cx, &entry, "a coordinator", several_row.example);
         if let (Some(ident), Some(path)) = (ident, text(cx, &entry.value, "a coordinator", several_row.example)) {
             out.push((Some(ident), path, entry.origin));
         }

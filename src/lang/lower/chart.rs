@@ -13,7 +13,7 @@
 //!     - { src: idle, tgt: copying, events: [e_aligned], effect: e_seen, pn: 1 }
 //! ```
 
-use super::{name, text, truth};
+use super::{name, own_name, text, truth};
 use crate::lang::grammar::{CONNECTOR, STATE, TRANSITION};
 use crate::lang::tree::{Cx, Entry, Fields, Kind, Node};
 use crate::limits;
@@ -118,14 +118,13 @@ fn of_yaml(cx: &mut Cx, node: Node) -> Option<StateParts> {
 
 fn child(cx: &mut Cx, entry: Entry, depth: usize) -> Option<statechart::ChartNode> {
     let exact = cx.sources.is_exact(entry.origin);
-    let key = Node::new(Kind::Str(entry.key.to_string().into()), entry.origin);
     let reserved = RESERVED.contains(&&*entry.key);
     if reserved {
         let origin = cx.part(entry.origin, &entry.key);
         let finding = Finding::error(codes::CHART_RESERVED, format!("a state cannot be called `{}`", entry.key));
         cx.report(finding.at(origin).help("the word means something else in a state's table: take another name"));
     }
-    let ident = name::<Ident>(cx, &key, "a state's name", "idle = state {}");
+    let ident = own_name::<Ident>(cx, &entry, "a state's name", "idle = state {}");
     let is_connector = match &entry.value.kind {
         Kind::Made(class, ..) => *class == "conn",
         Kind::Map(entries) => entries.iter().any(|e| e.key == "connector"),

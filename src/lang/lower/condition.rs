@@ -179,8 +179,8 @@ pub fn condition(cx: &mut Cx, node: Node, depth: usize) -> Option<Condition> {
             }
         }
         compared => {
-            let op = Comparison::ALL.into_iter().find(|op| op.word() == compared)?;
-            comparison(cx, t, op, depth)?
+            let (_, op) = Comparison::WORDS.iter().find(|(word, _)| *word == compared)?;
+            comparison(cx, t, *op, depth)?
         }
     };
     Some(Condition { kind, origin })
@@ -282,7 +282,7 @@ fn signal(cx: &mut Cx, node: Node, depth: usize) -> Option<MonitoredSignal> {
         }
         "activity" => {
             let activity = name::<Ident>(cx, &t.arg(), "an activity", t.word.usage);
-            let counter = choice(cx, &t.arg(), "the counter of an activity", &Counter::NAMES);
+            let counter = choice(cx, &t.arg(), "the counter of an activity", Counter::WORDS);
             K::Activity { activity: activity?, counter: counter? }
         }
         "norm" => K::Norm(list(cx, t.args)?),

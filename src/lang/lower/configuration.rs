@@ -1,6 +1,6 @@
 //! Configurations: what both spellings mean.
 
-use super::{choice, condition, entries, name, value};
+use super::{by_name, choice, condition, entries, name, own_name, value};
 use crate::lang::concern;
 use crate::lang::grammar::{BUFFER, CHANGES, CONFIGURATION, CONFIRM, UNDO, primitive as primitive_of};
 use crate::lang::tree::{Cx, Entry, Fields, Kind, Node};
@@ -31,15 +31,14 @@ pub fn configurations(cx: &mut Cx, node: Node) -> Vec<Configuration> {
     let mut all = Vec::with_capacity(entries.len());
     for entry in entries {
         let origin = if matches!(entry.value.kind, Kind::Made(..)) { entry.value.origin } else { entry.origin };
-        let (before, written) = (cx.findings.len(), entry.key.clone());
-        let key = Node::new(Kind::Str(entry.key.into()), entry.origin);
-        let id = name::<ConfigId>(cx, &key, "a configuration's name", "enable_copying");
+        let before = cx.findings.len();
+        let id = own_name::<ConfigId>(cx, &entry, "a configuration's name", "enable_copying");
         // Without a name its inside is still looked at, so that all findings come at once.
         let inside = configuration(cx, id.unwrap_or_else(unnamed), entry.value, origin);
         if let (Some(_), Some(configuration)) = (id, inside) {
             all.push(configuration);
         }
-        concern::all(cx, before, &written);
+        concern::all(cx, before, &entry.key);
     }
     all
 }
@@ -388,29 +387,19 @@ fn policy(cx: &mut Cx, node: Node) -> Option<Policy> {
 /// What ports are called on the component that replaces theirs.
 fn ports(cx: &mut Cx, node: Node) -> BTreeMap<Ident, Ident> {
     const EXAMPLE: &str = "map = { force = \"wrench\" }";
-    let mut out = BTreeMap::new();
-    for entry in entries(cx, node, "`map`", EXAMPLE) {
-        let key = Node::new(Kind::Str(entry.key.into()), entry.origin);
-        let from = name::<Ident>(cx, &key, "a port", EXAMPLE);
-        let to = name::<Ident>(cx, &entry.value, "a port", EXAMPLE);
-        out.extend(from.zip(to));
-    }
-    out
+    let entries = entries(cx, node, "`map`", EXAMPLE);
+    let to = |cx: &mut Cx, _, entry: Entry| name::<Ident>(cx, &entry.value, "a port", EXAMPLE);
+    by_name(cx, entries, "a port", EXAMPLE, to).into_iter().collect()
 }
 
 fn properties_of(cx: &mut Cx, node: Node, component: Option<ComponentName>) -> BTreeMap<Ident, Value> {
     let entries = entries(cx, node, "`properties`", "properties = { friction_comp = 0.9 }");
-    let mut out = BTreeMap::new();
-    for entry in entries {
-        let key = Node::new(Kind::Str(entry.key.into()), entry.origin);
-        let field = name::<Ident>(cx, &key, "a property", "friction_comp = 0.9");
+    let one = |cx: &mut Cx, field: Option<Ident>, entry: Entry| {
         let what = match (component, field) {
             (Some(component), Some(field)) => format!("`{component}.{field}`"),
             _ => "a property's value".to_owned(),
         };
-        if let (Some(field), Some(value)) = (field, value(cx, entry.value, &what)) {
-            out.insert(field, value);
-        }
-    }
-    out
+        value(cx, entry.value, &what)
+    };
+    by_name(cx, entries, "a property", "friction_comp = 0.9", one).into_iter().collect()
 }

@@ -2,7 +2,7 @@
 
 use super::beside::{self, Fall, Rise};
 use super::interface::{self, SubsystemDraft};
-use super::{entries, name, names, once, simulated, text, types, value};
+use super::{by_name, entries, name, names, once, own_name, simulated, text, types, value};
 use crate::lang::grammar::{ACTIVITY, DEPLOYMENT, LIMITS, TRUSTED};
 use crate::lang::tree::{Cx, Entry, Fields, Kind, Node};
 use crate::model::finding::did_you_mean;
@@ -195,18 +195,14 @@ fn platform(cx: &mut Cx, fields: &mut Fields) -> Option<(Ident, BTreeMap<Ident, 
         );
         return None;
     };
-    let key = Node::new(Kind::Str(entry.key.into()), entry.origin);
-    let platform = name::<Ident>(cx, &key, "a platform", example)?;
+    let platform = own_name::<Ident>(cx, &entry, "a platform", example)?;
     let mut options = BTreeMap::new();
     match entry.value.kind {
         Kind::Null => {}
         Kind::Map(entries) => {
-            for entry in entries {
-                let key = Node::new(Kind::Str(entry.key.into()), entry.origin);
-                let option = name::<Ident>(cx, &key, "an option of a platform", "device: can0");
-                let value = value(cx, entry.value, "an option of a platform");
-                options.extend(option.zip(value));
-            }
+            let what = "an option of a platform";
+            let one = |cx: &mut Cx, _, entry: Entry| value(cx, entry.value, what);
+            options.extend(by_name(cx, entries, what, "device: can0", one));
         }
         _ => cx.wrong(&entry.value, "what a platform is given", "a table of named values", "{ device: can0 }"),
     }
@@ -278,22 +274,16 @@ fn operator(cx: &mut Cx, fields: &mut Fields) -> Vec<(OperatorMay, Origin)> {
 }
 
 fn activities(cx: &mut Cx, node: Node) -> BTreeMap<Ident, Activity> {
-    let mut out = BTreeMap::new();
-    for entry in entries(cx, node, "`activities`", ACTIVITY.example) {
-        let key = Node::new(Kind::Str(entry.key.into()), entry.origin);
-        let ident = name::<Ident>(cx, &key, "an activity", ACTIVITY.example);
-        let Some(mut fields) = Fields::of(cx, entry.value, &ACTIVITY) else { continue };
+    let entries = entries(cx, node, "`activities`", ACTIVITY.example);
+    let one = |cx: &mut Cx, _, entry: Entry| {
+        let mut fields = Fields::of(cx, entry.value, &ACTIVITY)?;
         let period = fields.time(cx, "period_ms");
-        let priority = fields.whole(cx, "priority");
-        let cpu = fields.whole(cx, "cpu");
+        let priority = fields.whole(cx, "priority").and_then(|p| u8::try_from(p).ok()).unwrap_or_default();
+        let cpu = fields.whole(cx, "cpu").and_then(|c| u32::try_from(c).ok());
         fields.finish(cx);
-        if let Some(ident) = ident {
-            let priority = priority.and_then(|p| u8::try_from(p).ok()).unwrap_or_default();
-            let cpu = cpu.and_then(|c| u32::try_from(c).ok());
-            out.insert(ident, Activity { period, priority, cpu, origin: entry.origin });
-        }
-    }
-    out
+        Some(Activity { period, priority, cpu, origin: entry.origin })
+    };
+    by_name(cx, entries, "an activity", ACTIVITY.example, one).into_iter().collect()
 }
 
 fn limits(cx: &mut Cx, node: Node) -> DeploymentLimits {

@@ -1,12 +1,12 @@
 //! What makes a deployment a part of another one: its parameters, what it shows, its subsystems.
 
 use super::types::{fitting, value_type};
-use super::{entries, name, text, value};
+use super::{by_name, entries, name, text, value};
 use crate::lang::grammar::{EXPORTS, LEAVING, PARAMETER, SUBSYSTEM};
 use crate::lang::tree::{Cx, Entry, Fields, Kind, Node};
-use crate::model::subsystem::ExportKind;
 use crate::model::{
-    EventName, Export, Finding, Ident, Interface, LeavingRule, MemberRef, Origin, PropertyType, Tunable, codes,
+    EventName, Export, Finding, Ident, Interface, LeavingRule, MemberClass, MemberRef, Origin, PropertyType, Tunable,
+    codes,
 };
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -45,12 +45,8 @@ pub fn interface(cx: &mut Cx, fields: &mut Fields) -> Interface {
 
 /// A table of things by plain names.
 fn named(cx: &mut Cx, node: Node, what: &str, example: &str) -> Vec<(Ident, Entry)> {
-    let mut out = Vec::new();
-    for entry in entries(cx, node, what, example) {
-        let key = Node::new(Kind::Str(entry.key.to_string().into()), entry.origin);
-        out.extend(name::<Ident>(cx, &key, what, example).map(|name| (name, entry)));
-    }
-    out
+    let entries = entries(cx, node, what, example);
+    by_name(cx, entries, what, example, |_, _, entry| Some(entry))
 }
 
 fn parameter(cx: &mut Cx, entry: Entry) -> Option<PropertyType> {
@@ -68,7 +64,8 @@ fn parameter(cx: &mut Cx, entry: Entry) -> Option<PropertyType> {
 
 fn exports(cx: &mut Cx, node: Node, interface: &mut Interface) {
     let Some(mut fields) = Fields::of(cx, node, &EXPORTS) else { return };
-    for (key, kind) in ExportKind::KEYS {
+    for (_, kind) in MemberClass::WORDS {
+        let key = kind.several();
         let example = fields.row(key).example;
         let Some(node) = fields.take(cx, key) else { continue };
         for (name, entry) in named(cx, node, &format!("`exports.{key}`"), example) {
@@ -81,7 +78,7 @@ fn exports(cx: &mut Cx, node: Node, interface: &mut Interface) {
                 cx.report(finding.also(first.origin, "first here").help("give one of them another name"));
                 continue;
             }
-            interface.exports.insert(name, Export { kind, of, origin: entry.origin });
+            interface.exports.insert(name, Export { kind: *kind, of, origin: entry.origin });
         }
     }
     let place = fields.place("from");

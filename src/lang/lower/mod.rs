@@ -34,6 +34,28 @@ pub fn name<T: FromStr<Err = NameError>>(cx: &mut Cx, node: &Node, what: &str, e
     }
 }
 
+/// The name that an entry has.
+fn own_name<T: FromStr<Err = NameError>>(cx: &mut Cx, entry: &Entry, what: &str, example: &str) -> Option<T> {
+    let key = Node::new(Kind::Str(entry.key.to_string().into()), entry.origin);
+    name(cx, &key, what, example)
+}
+
+/// Entries with plain names, and what `one` reads of each: those of which both can be read.
+fn by_name<T>(
+    cx: &mut Cx,
+    entries: Vec<Entry>,
+    what: &str,
+    example: &str,
+    mut one: impl FnMut(&mut Cx, Option<Ident>, Entry) -> Option<T>,
+) -> Vec<(Ident, T)> {
+    let read = |entry: Entry| {
+        let name = own_name(cx, &entry, what, example);
+        let value = one(cx, name, entry);
+        name.zip(value)
+    };
+    entries.into_iter().filter_map(read).collect()
+}
+
 fn bad_name(cx: &mut Cx, node: &Node, error: &NameError, example: &str) {
     let origin = cx.place(node);
     let example = cx.spelt(node.origin, example);
@@ -253,15 +275,8 @@ pub fn value(cx: &mut Cx, node: Node, what: &str) -> Option<Value> {
         Kind::Map(entries) if entries.is_empty() => Some(Value::Array(Vec::new())),
         Kind::Map(entries) => {
             let length = entries.len();
-            let mut fields: Vec<(Ident, Value)> = Vec::with_capacity(length);
-            for entry in entries {
-                let key = Node::new(Kind::Str(entry.key.into()), entry.origin);
-                let field = name::<Ident>(cx, &key, "a field of a record", "{ x = 1.0 }");
-                if let (Some(field), Some(v)) = (field, value(cx, entry.value, what)) {
-                    fields.push((field, v));
-                }
-            }
-            // By name: the order of a Lua table is not known, and both languages must give the same model.
+            let mut fields =
+                by_name(cx, entries, "a field of a record", "{ x = 1.0 }", |cx, _, entry| value(cx, entry.value, what));
             fields.sort_by_key(|(name, _)| *name);
             (fields.len() == length).then_some(Value::Record(fields))
         }

@@ -1,6 +1,6 @@
 //! Monitors: what both spellings mean.
 
-use super::{condition, entries, name};
+use super::{condition, entries, own_name};
 use crate::lang::grammar::MONITOR;
 use crate::lang::tree::{Cx, Entry, Fields, Kind, Node};
 use crate::model::monitor::Sampling;
@@ -15,8 +15,7 @@ pub fn monitors(cx: &mut Cx, node: Node) -> Vec<Monitor> {
 
 fn monitor(cx: &mut Cx, entry: Entry) -> Option<Monitor> {
     let origin = if matches!(entry.value.kind, Kind::Made(..)) { entry.value.origin } else { entry.origin };
-    let key = Node::new(Kind::Str(entry.key.into()), entry.origin);
-    let id = name::<Ident>(cx, &key, "a monitor's name", "aligned");
+    let id = own_name::<Ident>(cx, &entry, "a monitor's name", "aligned");
     let entries = match entry.value.kind {
         Kind::Made("monitor", mut named, list) if list.is_empty() => {
             // Lua knows the place of the whole monitor only, and a number may stand in it more than once.

@@ -60,7 +60,7 @@ fn fault(cx: &mut Cx, node: Node) -> Option<StepFault> {
     let origin = node.origin;
     let mut fields = Fields::of(cx, node, &FAULT)?;
     let step = self::step(cx, &mut fields, origin, "step");
-    let how = fields.choice(cx, "how", &FaultKind::NAMES);
+    let how = fields.choice(cx, "how", FaultKind::WORDS);
     let times = fields.written(cx, "times", Fields::whole);
     let takes = match (how, fields.has("takes_s")) {
         (Some(how), true) if how != FaultKind::Slow => {

@@ -1,6 +1,6 @@
 //! Component types declared in a deployment.
 
-use super::{choice, condition, entries, name, text, value};
+use super::{by_name, choice, condition, entries, name, own_name, text, value};
 use crate::lang::grammar::{EFFECT, OPERATION, PORT, PROPERTY, TYPE};
 use crate::lang::tree::{Cx, Entry, Fields, Kind, Node};
 use crate::model::{
@@ -17,21 +17,14 @@ pub fn types(cx: &mut Cx, node: Node) -> Vec<ComponentType> {
 }
 
 fn component_type(cx: &mut Cx, entry: Entry) -> Option<ComponentType> {
-    let key = Node::new(Kind::Str(entry.key.into()), entry.origin);
-    let type_name = name::<TypeName>(cx, &key, "a component type", "Gain");
+    let type_name = own_name::<TypeName>(cx, &entry, "a component type", "Gain");
     let mut fields = Fields::of(cx, entry.value, &TYPE)?;
     let mut ty = ComponentType::new(type_name.as_ref().map_or("unnamed", TypeName::as_str), "");
     ty.origin = entry.origin;
     ty.doc = doc(cx, &mut fields);
-    if let Some(node) = fields.take(cx, "ports") {
-        ty.ports = named(cx, node, "`ports`", "u: { direction: in, type: float }", port);
-    }
-    if let Some(node) = fields.take(cx, "properties") {
-        ty.properties = named(cx, node, "`properties`", "k: { type: float, default: 1.0 }", property);
-    }
-    if let Some(node) = fields.take(cx, "operations") {
-        ty.operations = named(cx, node, "`operations`", "reset: { effect: none }", operation);
-    }
+    ty.ports = members(cx, &mut fields, "ports", "u: { direction: in, type: float }", port);
+    ty.properties = members(cx, &mut fields, "properties", "k: { type: float, default: 1.0 }", property);
+    ty.operations = members(cx, &mut fields, "operations", "reset: { effect: none }", operation);
     ty.start_after = fields.names(cx, "start_after");
     ty.stop_before = fields.names(cx, "stop_before");
     ty.actuator = fields.truth(cx, "actuator").unwrap_or_default();
@@ -73,28 +66,23 @@ fn unit(cx: &mut Cx, fields: &mut Fields) -> Option<Arc<str>> {
     fields.text(cx, "unit").map(Arc::from)
 }
 
-/// A map of members, each lowered by `one`.
-fn named<T>(
+/// The members of one kind, each lowered by `one`.
+fn members<T>(
     cx: &mut Cx,
-    node: Node,
-    what: &str,
+    fields: &mut Fields,
+    key: &'static str,
     example: &str,
     one: impl Fn(&mut Cx, Entry) -> Option<T>,
 ) -> BTreeMap<Ident, T> {
-    let mut out = BTreeMap::new();
-    for entry in entries(cx, node, what, example) {
-        let key = Node::new(Kind::Str(entry.key.to_string().into()), entry.origin);
-        let ident = name::<Ident>(cx, &key, "a member of a component type", example);
-        if let (Some(ident), Some(member)) = (ident, one(cx, entry)) {
-            out.insert(ident, member);
-        }
-    }
-    out
+    let Some(node) = fields.take(cx, key) else { return BTreeMap::new() };
+    let entries = entries(cx, node, &format!("`{key}`"), example);
+    let one = |cx: &mut Cx, _, entry: Entry| one(cx, entry);
+    by_name(cx, entries, "a member of a component type", example, one).into_iter().collect()
 }
 
 fn port(cx: &mut Cx, entry: Entry) -> Option<PortType> {
     let mut fields = Fields::of(cx, entry.value, &PORT)?;
-    let direction = fields.choice(cx, "direction", &[("in", Direction::In), ("out", Direction::Out)]);
+    let direction = fields.choice(cx, "direction", Direction::WORDS);
     let ty = fields.take(cx, "type").and_then(|node| value_type(cx, node));
     let unit = unit(cx, &mut fields);
     let buffered = fields.truth(cx, "buffered").unwrap_or_default();
@@ -115,8 +103,7 @@ fn property(cx: &mut Cx, entry: Entry) -> Option<PropertyType> {
     let ty = fields.take(cx, "type").and_then(|node| value_type(cx, node));
     let default = fields.take(cx, "default");
     let (min, max) = (fields.number(cx, "min"), fields.number(cx, "max"));
-    let when = [("unconfigured", Tunable::Unconfigured), ("stopped", Tunable::Stopped), ("always", Tunable::Always)];
-    let tunable = fields.choice(cx, "tunable", &when).unwrap_or_default();
+    let tunable = fields.choice(cx, "tunable", Tunable::WORDS).unwrap_or_default();
     let unit = unit(cx, &mut fields);
     let doc = doc(cx, &mut fields);
     fields.finish(cx);
@@ -220,14 +207,8 @@ pub(super) fn value_type(cx: &mut Cx, node: Node) -> Option<ValueType> {
         },
         Kind::Map(entries) if !entries.is_empty() => {
             let length = entries.len();
-            let mut fields = Vec::with_capacity(length);
-            for entry in entries {
-                let key = Node::new(Kind::Str(entry.key.into()), entry.origin);
-                let field = name::<Ident>(cx, &key, "a field of a record", "{x: float, y: float}");
-                if let (Some(field), Some(ty)) = (field, value_type(cx, entry.value)) {
-                    fields.push((field, ty));
-                }
-            }
+            let one = |cx: &mut Cx, _, entry: Entry| value_type(cx, entry.value);
+            let fields = by_name(cx, entries, "a field of a record", "{x: float, y: float}", one);
             (fields.len() == length).then_some(ValueType::Record(fields))
         }
         // `float[3]` without quotes inside brackets is read by YAML as a list: say so.

@@ -103,21 +103,7 @@ impl CommonConditions {
                 return;
             }
         }
-        inside(c).into_iter().for_each(|inner| self.count(inner));
-    }
-}
-
-/// The conditions that a condition is made of.
-fn inside(c: &Condition) -> Vec<&Condition> {
-    use ConditionKind as K;
-    match &c.kind {
-        K::Compare { .. } | K::IsTrue(_) | K::InState { .. } | K::Faulted(_) | K::Silent { .. } => Vec::new(),
-        K::All(list) | K::Any(list) => list.iter().collect(),
-        K::No(c) | K::Rise(c) | K::Fall(c) => vec![c],
-        K::Implies(a, b) => vec![a, b],
-        K::Once { condition, .. } | K::Historically { condition, .. } => vec![condition],
-        K::Since { hold, from, .. } => vec![hold, from],
-        K::ForAtLeast { condition, .. } | K::WithinLast { condition, .. } => vec![condition],
+        c.parts().into_iter().for_each(|inner| self.count(inner));
     }
 }
 

@@ -7,7 +7,7 @@ use crate::diagnostics::Language;
 use crate::model::monitor::Condition;
 use crate::model::statechart::{ChartNode, State};
 use crate::model::{
-    ComponentType, Configuration, Coordinator, CoordinatorNaming, Deployment, Effect, ExportKind, Ident, Interface,
+    ComponentType, Configuration, Coordinator, CoordinatorNaming, Deployment, Effect, Ident, Interface, MemberClass,
     Statechart, Tunable, Value,
 };
 use std::fmt::{Display, Write as _};
@@ -140,15 +140,15 @@ fn interface(out: &mut String, of: &Interface) {
     }
     if !of.exports.is_empty() {
         out.push_str("exports:\n");
-        for (key, kind) in ExportKind::KEYS {
+        for (_, kind) in MemberClass::WORDS {
             let own: Vec<String> = of
                 .exports
                 .iter()
-                .filter(|(_, export)| export.kind == kind)
+                .filter(|(_, export)| export.kind == *kind)
                 .map(|(name, export)| format!("{}: {}", t(name), t(&export.of)))
                 .collect();
             if !own.is_empty() {
-                _ = writeln!(out, "  {key}: {{ {} }}", own.join(", "));
+                _ = writeln!(out, "  {}: {{ {} }}", kind.several(), own.join(", "));
             }
         }
         if let Some((event, _)) = of.from {
@@ -203,10 +203,8 @@ fn component_type(out: &mut String, ty: &ComponentType) {
                 _ = write!(parts, ", {name}: {}", float(limit));
             }
         }
-        match property.tunable {
-            Tunable::Always => {}
-            Tunable::Stopped => parts.push_str(", tunable: stopped"),
-            Tunable::Unconfigured => parts.push_str(", tunable: unconfigured"),
+        if property.tunable != Tunable::Always {
+            _ = write!(parts, ", tunable: {}", property.tunable);
         }
         _ = writeln!(body, "      {}: {{ {parts}{}{} }}", t(name), unit(&property.unit), doc(&property.doc));
     }

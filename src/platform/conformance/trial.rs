@@ -130,22 +130,9 @@ impl Trial {
         until: Time,
         f: impl FnOnce(&dyn Platform) -> T + Send + 'static,
     ) -> RuleEnds<T> {
-        let (answer, answered) = self.made.clock.channel(1);
-        let platform = self.made.platform.clone();
-        self.made.clock.spawn("conformance", move || {
-            let came = catch_unwind(AssertUnwindSafe(|| f(&*platform)));
-            // Whoever made it drops it, not a thread that has just ended.
-            drop(platform);
-            let _ = answer.try_send(came.map_err(|payload| panic_text(&*payload)));
-        });
-        match answered.recv_deadline(until + self.times.late) {
-            Ok(Ok(it)) => Ok(it),
-            Ok(Err(text)) => Err(broken(with, "an answer", format_args!("the platform panicked: {text}"))),
-            Err(_) => {
-                let late = self.times.late;
-                Err(broken(with, format_args!("an answer by {until}, or {late:?} later at most"), "no answer"))
-            }
-        }
+        let late = self.times.late;
+        let expected = format!("an answer by {until}, or {late:?} later at most");
+        self.work(with.to_string(), f).by(until + late, expected).map(|(it, _)| it)
     }
 
     /// Has the platform do what does not wait.
@@ -304,10 +291,14 @@ pub struct CallUnderWay<T> {
 impl<T> CallUnderWay<T> {
     /// What came of it, by `deadline`, and when.
     pub fn ended(&self, deadline: Time) -> RuleEnds<(T, Time)> {
+        self.by(deadline, format_args!("an answer by {deadline}"))
+    }
+
+    fn by(&self, deadline: Time, expected: impl Display) -> RuleEnds<(T, Time)> {
         match self.answered.recv_deadline(deadline) {
             Ok(Ok(it)) => Ok(it),
             Ok(Err(text)) => Err(broken(&self.with, "an answer", format_args!("the platform panicked: {text}"))),
-            Err(_) => Err(broken(&self.with, format_args!("an answer by {deadline}"), "no answer")),
+            Err(_) => Err(broken(&self.with, expected, "no answer")),
         }
     }
 }

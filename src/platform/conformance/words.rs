@@ -1,34 +1,18 @@
 //! The types that the rules are tried with, and short words for steps.
 
 use crate::model::{
-    Call, ComponentName, ComponentType, Direction, Effect, Ident, MemberRef, OperationType, Origin, Policy, PortType,
+    Call, ComponentName, ComponentType, Direction, Effect, Ident, MemberRef, OperationType, Policy, PortType,
     PropertyType, Step, Transition, Tunable, TypeName, Value,
 };
 use std::collections::BTreeMap;
 
 fn port(direction: Direction, ty: &str, unit: Option<&str>, buffered: bool) -> PortType {
-    PortType {
-        direction,
-        ty: ty.parse().expect("a type"),
-        unit: unit.map(Into::into),
-        buffered,
-        required: false,
-        doc: String::new(),
-        origin: Origin::NONE,
-    }
+    PortType { unit: unit.map(Into::into), buffered, ..PortType::new(direction, ty.parse().expect("a type")) }
 }
 
 fn property(ty: &str, default: Option<Value>, limits: Option<(f64, f64)>, tunable: Tunable) -> PropertyType {
-    PropertyType {
-        ty: ty.parse().expect("a type"),
-        default,
-        min: limits.map(|l| l.0),
-        max: limits.map(|l| l.1),
-        tunable,
-        unit: None,
-        doc: String::new(),
-        origin: Origin::NONE,
-    }
+    let (min, max) = limits.unzip();
+    PropertyType { default, min, max, ..PropertyType::new(ty.parse().expect("a type"), tunable) }
 }
 
 fn operation(args: &[&str], returns: Option<&str>) -> OperationType {

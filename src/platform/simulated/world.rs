@@ -23,6 +23,7 @@ pub(super) struct SimulatedComponent {
 }
 
 /// Everything there is.
+#[derive(Default)]
 pub(super) struct SimulatedWorld {
     pub catalogue: Catalogue,
     /// Activities that exist; none: any name is accepted.
@@ -40,15 +41,7 @@ type RefusalText = String;
 
 impl SimulatedWorld {
     pub fn new(catalogue: Catalogue, activities: Option<BTreeSet<Ident>>) -> Self {
-        Self {
-            catalogue,
-            activities,
-            components: BTreeMap::new(),
-            connections: BTreeMap::new(),
-            incoming: BTreeMap::new(),
-            outgoing: BTreeMap::new(),
-            written: BTreeMap::new(),
-        }
+        Self { catalogue, activities, ..Self::default() }
     }
 
     fn component(&self, name: ComponentName) -> Result<&SimulatedComponent, RefusalText> {

@@ -1,29 +1,11 @@
 //! What is known of a push is what it comes to.
 
 use super::*;
-use crate::stack::{Group, PlannedPushes, PushesOf, Request, Rules, World, take_up};
-use rustc_hash::{FxHashMap, FxHashSet};
+use crate::stack::PlannedPushes;
 
 fn asked(world: &World, asks: &[Ask], configurations: &[Configuration], pushes: Option<PushesOf<'_>>) -> Group {
-    let configurations: FxHashMap<ConfigId, Configuration> =
-        configurations.iter().map(|configuration| (configuration.id, configuration.clone())).collect();
-    let requests: Vec<Request> = asks
-        .iter()
-        .map(|ask| Request { force: true, ..Request::new(RequestId(1), *ask, Requester::Operator) })
-        .collect();
-    let rules = Rules {
-        configurations: &configurations,
-        context: &PlanContext::default(),
-        at: Time(0),
-        held: &[],
-        places: &[],
-        operator: &FxHashSet::default(),
-        joined: true,
-        placed: false,
-        alone: None,
-        pushes,
-    };
-    take_up(world, &requests, &rules)
+    let request = |ask: &Ask| Request { force: true, ..Request::new(RequestId(1), *ask, Requester::Operator) };
+    taken_up(world, &asks.iter().map(request).collect::<Vec<_>>(), configurations, true, pushes)
 }
 
 /// Also for what follows it in the same batch, and where it is refused.

@@ -2,10 +2,6 @@
 
 use super::*;
 
-fn at(configuration: &Configuration, requester: Requester) -> Op<'_> {
-    Op::Push { configuration, requester, at: Time(0), scope: None }
-}
-
 #[test]
 fn frames_of_active_states_are_never_squashed() {
     let mut bench = Bench::new(3);
@@ -68,14 +64,14 @@ fn what_holds_a_thing_is_not_squashed_past_who_let_it_go() {
     let c = Requester::Coordinator(ComponentName::new("c").unwrap());
     let has = |id: &str, of: &str| conf(id, None, &[], vec![create(of, "t.Bus")], &[(of, Wanted::Stopped)]);
     let of = |id: &str| conf(id, None, &[], vec![set("A.gain", 1.0)], &[]);
-    bench.ok(&[at(&has("one", "X"), c)]);
+    bench.ok(&[push_by(&has("one", "X"), c)]);
     let gone = ChangeKind::Destroy { component: ComponentName::new("X").unwrap() };
-    let free = bench.ok(&[at(&conf("free", None, &[], vec![gone], &[]), Requester::Operator)]).1[0];
-    bench.ok(&[at(&has("other", "Y"), c)]);
+    let free = bench.ok(&[push_by(&conf("free", None, &[], vec![gone], &[]), Requester::Operator)]).1[0];
+    bench.ok(&[push_by(&has("other", "Y"), c)]);
     // The one that is undone would have to hold what `Y` holds.
     assert_eq!(bench.codes(&[Op::Undo(free)]), ["stack::shared"]);
     // `one` and `other` are not one at the place of `one`: neither could be undone then.
-    bench.ok(&[at(&of("third"), c)]);
+    bench.ok(&[push_by(&of("third"), c)]);
     assert!(bench.stack.len() == 3, "{:?}", bench.stack.frames());
     bench.ok(&[Op::UndoTo(0)]);
     assert!(bench.system.component(ComponentName::new("X").unwrap()).is_none());
@@ -89,8 +85,8 @@ fn what_others_set_between_does_not_keep_frames_apart() {
         conf(id, None, &[], vec![set("A.gain", gain as f64), set("B.gain", other)], &[])
     };
     for n in 0..8 {
-        bench.ok(&[at(&of("mode", n, 0.5), by("c"))]);
-        bench.ok(&[at(&conf("mine", None, &[], vec![set("A.gain", 10.0 + n as f64)], &[]), Requester::Operator)]);
+        bench.ok(&[push_by(&of("mode", n, 0.5), by("c"))]);
+        bench.ok(&[push_by(&conf("mine", None, &[], vec![set("A.gain", 10.0 + n as f64)], &[]), Requester::Operator)]);
     }
     assert_eq!(bench.stack.len(), 6);
     // What the operator has set lately is there without what the coordinator did, and the other way about.
@@ -107,10 +103,10 @@ fn what_others_set_between_does_not_keep_frames_apart() {
     let [low, high] =
         [("low", "A.gain"), ("high", "B.gain")].map(|(id, of)| conf(id, None, &[], vec![set(of, 1.0)], &[]));
     for own in [&low, &high] {
-        bench.ok(&[at(own, by("c"))]);
-        bench.ok(&[at(&of("mine", 2, 2.0), Requester::Operator)]);
+        bench.ok(&[push_by(own, by("c"))]);
+        bench.ok(&[push_by(&of("mine", 2, 2.0), Requester::Operator)]);
     }
-    let refused = bench.ask(&[at(&low, by("c"))]).unwrap_err();
+    let refused = bench.ask(&[push_by(&low, by("c"))]).unwrap_err();
     let finding = &refused.findings[0];
     assert_eq!(
         (finding.code.0, finding.help.as_deref().unwrap_or_default()),
@@ -171,12 +167,12 @@ fn what_can_be_undone_beside_others_still_can() {
     let mut bench = Bench::new(2);
     let by = |name: &str| Requester::Coordinator(ComponentName::new(name).unwrap());
     let of = |id: &str, operation: &str| conf(id, None, &[], vec![call(operation)], &[]);
-    bench.ok(&[at(&of("low", "A.open"), by("c"))]);
-    bench.ok(&[at(&of("mine", "B.open"), Requester::Operator)]);
+    bench.ok(&[push_by(&of("low", "A.open"), by("c"))]);
+    bench.ok(&[push_by(&of("mine", "B.open"), Requester::Operator)]);
     // Of another file: no hindrance to `low`, which above it would be one to it.
-    let foreign = bench.ok(&[at(&of("s/mine", "A.open"), Requester::Operator)]).1[0];
-    bench.ok(&[at(&of("high", "B.open"), by("c"))]);
-    bench.ok(&[at(&of("high", "B.open"), by("c"))]);
+    let foreign = bench.ok(&[push_by(&of("s/mine", "A.open"), Requester::Operator)]).1[0];
+    bench.ok(&[push_by(&of("high", "B.open"), by("c"))]);
+    bench.ok(&[push_by(&of("high", "B.open"), by("c"))]);
     assert_eq!(bench.stack.len(), 4);
     bench.ok(&[Op::Undo(foreign)]);
 }

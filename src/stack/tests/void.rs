@@ -2,25 +2,15 @@
 
 use super::*;
 
-fn create(name: &str) -> ChangeKind {
-    ChangeKind::Create {
-        component: ComponentName::new(name).unwrap(),
-        ty: TypeName::new("t.Arm").unwrap(),
-        activity: None,
-        properties: BTreeMap::new(),
-    }
-}
-
 fn by<'c>(configuration: &'c Configuration, coordinator: &str) -> Op<'c> {
-    let requester = Requester::Coordinator(ComponentName::new(coordinator).unwrap());
-    Op::Push { configuration, requester, at: Time(0), scope: None }
+    push_by(configuration, Requester::Coordinator(ComponentName::new(coordinator).unwrap()))
 }
 
 /// Two subsystems with an arm each, made by their own coordinators.
 fn two(bound: usize) -> (Bench, [FrameId; 2]) {
     let mut bench = Bench { system: System::new(types()), stack: Stack::new(bound) };
     let made = ["s", "t"].map(|path| {
-        let make = conf(&format!("{path}/make"), None, &[], vec![create(&format!("{path}/A"))], &[]);
+        let make = conf(&format!("{path}/make"), None, &[], vec![create(&format!("{path}/A"), "t.Arm")], &[]);
         bench.ok(&[by(&make, path)]).1[0]
     });
     (bench, made)

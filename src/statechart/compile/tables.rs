@@ -8,8 +8,6 @@ use crate::model::statechart::{Action, FunctionId, ROOT, Since, Trigger};
 use crate::statechart::chart::{
     ActionOp, Chart, EdgeRow, EventId, NONE, NodeKind, NodeRow, RaiseMoment, RaiseSite, Span, TimerRow,
 };
-use crate::statechart::reactions::ReactionTable;
-use crate::statechart::wide::Wide;
 use crate::statechart::{EdgeId, NodeId, order};
 use rustc_hash::FxHashMap;
 
@@ -23,26 +21,14 @@ impl ChartBuilder<'_> {
         let mut chart = Chart {
             nodes: Vec::with_capacity(self.names.len()),
             edges: Vec::with_capacity(self.edges.len()),
-            ops: Vec::new(),
-            triggers: Vec::new(),
-            predicates: Vec::new(),
-            timers: Vec::new(),
-            events: Vec::new(),
-            event_ids: FxHashMap::default(),
-            names: Vec::new(),
-            node_origins: Vec::new(),
             edge_origins: Vec::with_capacity(self.edges.len()),
             priorities: Vec::with_capacity(self.edges.len()),
-            raises: Vec::new(),
-            children: FxHashMap::default(),
             initial: self.children[&(0, initial())],
             depth: self.depths.iter().copied().max().unwrap_or(0),
-            connector_edges: 0,
             unguarded: true,
             pure,
             init: self.event("e_init_fsm").unwrap_or(EventId::INIT),
-            reactions: ReactionTable::default(),
-            wide: Wide::default(),
+            ..Chart::default()
         };
         for (node, out) in outgoing.iter_mut().enumerate() {
             order::sort(out, |index| self.edges[*index].pn);
