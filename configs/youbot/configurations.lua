@@ -20,6 +20,16 @@ local function with_law(changes)
   return changes
 end
 
+-- All but driver, monitors and world, as data go from one to the next.
+local function controllers(run_state)
+  local list = {}
+  for _, name in ipairs{ "Arm_Kinematics", "Link_Tx", "Peer", "Link_Rx", "Cart_Impedance", "Dynamics", "Base_Ctrl", "Operator",
+                         "Mode_Switch", "Reporter" } do
+    if name ~= "Peer" or stand_in then table.insert(list, name .. ":" .. run_state) end
+  end
+  return list
+end
+
 ConfiguratorConf {
 
   -- Bring-up ---------------------------------------------------------------------------------------------------------
@@ -110,8 +120,8 @@ ConfiguratorConf {
     property_set("Peer.force_gain",              { 0.1, 0.1, 0.1 }),   -- its base yields as ours does
   } end))),
 
-  start_driver = Configuration { description = "drives on, brakes closed: the arm rests on its stops",
-    post_conf_state = stand_in and { "World:running", "youbot:running" } or { "youbot:running" },
+  start_driver = Configuration { description = "drives on, brakes closed: the arm rests on its stops. From here on they are watched",
+    post_conf_state = stand_in and { "World:running", "youbot:running", "Monitors:running" } or { "youbot:running", "Monitors:running" },
   },
 
   calibrate = Configuration { timeout = 10.0,
@@ -210,11 +220,12 @@ ConfiguratorConf {
     operation_call("youbot.fold"):undo("youbot.unfold"),
   },
 
-  stop_control = Configuration { description = "everything but the driver",
-    pre_conf_state = stand_in and { "youbot:running", "World:running", "_default:stopped" } or { "youbot:running", "_default:stopped" },
+  stop_control = Configuration { description = "everything but the driver, and what watches it",
+    pre_conf_state = controllers("stopped"),
   },
 
   stop_all = Configuration {
+    pre_conf_state = { "Monitors:stopped" },
     operation_call("youbot.setControlMode", 0):undo("youbot.setControlMode", 1),
     post_conf_state = { "youbot:stopped" },
   },

@@ -283,8 +283,8 @@ impl ActivityThread {
     }
 
     #[inline]
-    fn update(&self, cell: &Arc<Cell>, mut inside: CellGuard<'_>, now: Time, release: Time, first: f64) {
-        let fault = inside.update(&self.clock, now, release, first).err();
+    fn update(&self, cell: &Arc<Cell>, mut inside: CellGuard<'_>, now: Time, release: Time, period: f64) {
+        let fault = inside.update(&self.clock, now, release, period).err();
         self.leave(cell, inside, fault);
     }
 

@@ -25,6 +25,8 @@ impl Component for Slow {
 
     fn update(&mut self, cx: &mut Context) {
         log::note(cx.clock(), format!("{} {} dt {}", cx.name(), cx.now().as_nanos() / 1_000_000, cx.dt() * 1e3));
+        // What is missed is no part of it.
+        assert_eq!(cx.period(), 0.01);
         let takes = self.takes_ms.get();
         if takes < 0 {
             cx.clock().hang();
