@@ -73,7 +73,6 @@ for _, late in ipairs{ { "Dynamics", 0.005 }, { "youbot", 0.015 }, { "youbot", 0
     wait_state("left:operational", 0.1)
   end
 end
-hand("free 600")
 all_copy()
 raise("e_shutdown")
 wait_state("pair:idle", 20)

@@ -16,7 +16,7 @@ local function meets(mode, wall, seconds, after)
   local of, axis, to = "World.robot2_" .. (wall and "wall" or "table"), wall and 0 or 2, wall and 1 or -1
   local name = mode .. " dof, " .. (wall and "wall" or "table") .. ", " .. seconds .. " s, " .. after .. " s"
   set(of, signal("World.robot2_tool_pose.p[" .. axis .. "]") + to * 0.05, { force = true, within = 1 })
-  local s = sample{ every = 0.001, name = name:gsub("[^%w]+", "_"), signals = {
+  local s = sample{ every = 0.001, name = "p" .. name:gsub("[^%w]+", "_"), signals = {
     f = "World.robot2_contact[" .. axis .. "]", v = "World.robot2_tool_twist.v[" .. axis .. "]" } }
   hand(("go %g %g 0 %g; hold 600"):format(seconds, wall and 0.1 or 0, wall and 0 or -0.1))
   for _ = 1, 5000 do
@@ -33,7 +33,7 @@ local function meets(mode, wall, seconds, after)
     if t <= at + 0.1 then before = math.max(before, math.abs(f[i])) end
     if t >= at + 0.3 then held, worst.rest = math.max(held, math.abs(f[i])), math.max(worst.rest, math.abs(v[i])) end
   end
-  assert(before > 1, "it met nothing")
+  assert(before > 0.1, "it met nothing")
   figure{ name = name .. ": pressed with", value = before, unit = "N" }
   figure{ name = name .. ": held", value = held, unit = "N" }
   worst.held, worst.more = math.max(worst.held, held), math.max(worst.more, held - before)
@@ -44,9 +44,10 @@ end
 
 for _, mode in ipairs{ "5", "8" } do
   for _, wall in ipairs{ true, false } do
-    for _, after in ipairs{ 0, 0.1, 2 } do meets(mode, wall, 2, after) end
+    for _, after in ipairs{ 0, 0.1 } do meets(mode, wall, 2, after) end
   end
-  meets(mode, true, 0.6, 0)
+  meets(mode, true, 2, 2)
+  meets(mode, true, 1.2, 0.05)
 end
 expect{ name = "held against it with", value = worst.held, max = 10, unit = "N" }
 expect{ name = "more than before the stop", value = worst.more, max = 0, unit = "N" }

@@ -26,9 +26,10 @@ inject("left/youbot", "panic", {}, at)
 wait_answer("left/e_EC_TIMEOUT", 1)
 expect{ name = "noticed after", value = 1000 * (now() - at), max = 50, unit = "ms" }
 wait_state(where == "fault" and "left:fault" or "left:halted", 0.01)
-wait_answer(({ fault = "left/brake_again.failed", halted = "left/brake_again.failed" })[where] or "left/safe_hold.failed", 0.1)
+wait_answer((where == "fault" or where == "halted") and "left/brake_again.broken" or "left/safe_hold.broken", 0.1)
 
 -- What is asked for behind that is refused too, and nothing goes on as if it were not.
+wait(0.01)
 raise("left/e_reset")
 if where == "fault" then wait_answer("left/clear_faults.failed", 0.1) end
 wait(2)
