@@ -23,10 +23,17 @@ end
 -- All but driver, monitors and world, as data go from one to the next.
 local function controllers(run_state)
   local list = {}
-  for _, name in ipairs{ "Arm_Kinematics", "Link_Tx", "Peer", "Link_Rx", "Cart_Impedance", "Dynamics", "Base_Ctrl", "Operator",
-                         "Mode_Switch", "Reporter" } do
-    if name ~= "Peer" or stand_in then table.insert(list, name .. ":" .. run_state) end
+  for _, name in ipairs{
+    "Arm_Kinematics", "Link_Tx", "Peer", "Link_Rx", "Cart_Impedance", "Dynamics", "Base_Ctrl", "Operator", "Reporter",
+    "Mode_Switch",
+  } do
+    if stand_in or name ~= "Peer" then table.insert(list, name .. ":" .. run_state) end
   end
+  return list
+end
+
+local function with_world(list)
+  if stand_in then table.insert(list, 1, "World:running") end
   return list
 end
 
@@ -121,7 +128,10 @@ ConfiguratorConf {
   } end))),
 
   start_driver = Configuration { description = "drives on, brakes closed: the arm rests on its stops. From here on they are watched",
-    post_conf_state = stand_in and { "World:running", "youbot:running", "Monitors:running" } or { "youbot:running", "Monitors:running" },
+    post_conf_state = with_world{
+      "youbot:running",
+      "Monitors:running",
+    },
   },
 
   calibrate = Configuration { timeout = 10.0,

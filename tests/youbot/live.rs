@@ -120,8 +120,8 @@ fn probed(id: i64, change: impl Fn(String) -> String) -> String {
     let text = behind(&text, "destroy_all = Configuration(with_stand_in({", "destroy(\"Probe\"),");
     change(behind(
         &text,
-        "post_conf_state = stand_in and { \"World:running\", \"youbot:running\"",
-        ", \"Probe:running\"",
+        "post_conf_state = with_world{\n      \"youbot:running\",",
+        "\n      \"Probe:running\",",
     ))
 }
 
