@@ -20,18 +20,6 @@ local function with_law(changes)
   return changes
 end
 
--- All but driver, monitors and world, as data go from one to the next.
-local function controllers(run_state)
-  local list = {}
-  for _, name in ipairs{
-    "Arm_Kinematics", "Link_Tx", "Peer", "Link_Rx", "Cart_Impedance", "Dynamics", "Base_Ctrl", "Operator", "Reporter",
-    "Mode_Switch",
-  } do
-    if stand_in or name ~= "Peer" then table.insert(list, name .. ":" .. run_state) end
-  end
-  return list
-end
-
 local function with_world(list)
   if stand_in then table.insert(list, 1, "World:running") end
   return list
@@ -230,12 +218,11 @@ ConfiguratorConf {
     operation_call("youbot.fold"):undo("youbot.unfold"),
   },
 
-  stop_control = Configuration { description = "everything but the driver, and what watches it",
-    pre_conf_state = controllers("stopped"),
+  stop_control = Configuration { description = "everything but the driver",
+    pre_conf_state = stand_in and { "youbot:running", "World:running", "_default:stopped" } or { "youbot:running", "_default:stopped" },
   },
 
   stop_all = Configuration {
-    pre_conf_state = { "Monitors:stopped" },
     operation_call("youbot.setControlMode", 0):undo("youbot.setControlMode", 1),
     post_conf_state = { "youbot:stopped" },
   },
