@@ -32,6 +32,8 @@ local degraded = all { settled, no(good) }
 local force = "Cart_Impedance.f_raw_norm"
 local heard = no(silent(force, 0.2))
 local torques = equals("youbot.control_mode", 6)
+-- What commands them is started just before they take torques, and has written once in each of its periods by then.
+local commanded = torques:for_at_least(0.01)
 -- A driver that is dead goes on showing what it said last. Where that was that the drives have power nobody knows what they do now; one that
 -- was stopped shows that they have none.
 local driver_lost = all { differs("youbot.control_mode", 0), silent("youbot.jointstate", DEAD) }
@@ -92,10 +94,10 @@ Monitors {
                  driver_lost },
     event = "e_EC_TIMEOUT", repeat_every = AGAIN },
   controller_lost = monitor { description = "the impedance controller, which writes in every update, is not heard by drives that take torques",
-    when = all { torques, silent("Cart_Impedance.active", DEAD) },
+    when = all { commanded, silent("Cart_Impedance.active", DEAD) },
     event = "e_controller_lost", repeat_every = AGAIN },
   control_lost = monitor { description = "another part of the control loop, which writes in every update, is not heard by drives that take torques",
-    when = all { torques,
+    when = all { commanded,
                  any { silent("Arm_Kinematics.tool_pose", DEAD), silent("Dynamics.tau_sat", DEAD),
                        silent("Base_Ctrl.cmd_twist", DEAD) } },
     event = "e_control_lost", repeat_every = AGAIN },
