@@ -20,6 +20,11 @@ local function with_law(changes)
   return changes
 end
 
+local function with_world(list)
+  if stand_in then table.insert(list, 1, "World:running") end
+  return list
+end
+
 ConfiguratorConf {
 
   -- Bring-up ---------------------------------------------------------------------------------------------------------
@@ -110,8 +115,11 @@ ConfiguratorConf {
     property_set("Peer.force_gain",              { 0.1, 0.1, 0.1 }),   -- its base yields as ours does
   } end))),
 
-  start_driver = Configuration { description = "drives on, brakes closed: the arm rests on its stops",
-    post_conf_state = stand_in and { "World:running", "youbot:running" } or { "youbot:running" },
+  start_driver = Configuration { description = "drives on, brakes closed: the arm rests on its stops. From here on they are watched",
+    post_conf_state = with_world{
+      "youbot:running",
+      "Monitors:running",
+    },
   },
 
   calibrate = Configuration { timeout = 10.0,

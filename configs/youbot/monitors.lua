@@ -31,11 +31,15 @@ local degraded = all { settled, no(good) }
 
 local force = "Cart_Impedance.f_raw_norm"
 local heard = no(silent(force, 0.2))
--- A driver that is dead goes on showing what it said last. Where that was that the drives take torques nobody knows what they do now; one
--- that was stopped did not show it.
-local driver_lost = all { equals("youbot.control_mode", 6), silent("youbot.jointstate", DEAD) }
--- Near counts where the drives take torques: a robot that is stopped is not about to couple.
-local near  = all { heard, below(force, 2.0), equals("youbot.control_mode", 6), no(driver_lost) }:for_at_least(0.3)
+local torques = equals("youbot.control_mode", 6)
+-- What commands them is started just before they take torques, and has written once in each of its periods by then.
+local commanded = torques:for_at_least(0.01)
+-- A driver that is dead goes on showing what it said last. Where that was that the drives have power nobody knows what they do now; one that
+-- was stopped shows that they have none.
+local driver_lost = all { differs("youbot.control_mode", 0), silent("youbot.jointstate", DEAD) }
+-- Near counts where the drives take torques: a robot that is stopped is not about to couple. Nor is one that does not hear the other one: it
+-- knows where that one was, and not where it is.
+local near  = all { heard, no(lost), below(force, 2.0), torques, no(driver_lost) }:for_at_least(0.3)
 local peer  = "Link_Rx.peer_state"
 
 -- The fastest joint, in rad/s.
@@ -44,7 +48,8 @@ local fastest = max { abs("youbot.jointstate.vel[0]"), abs("youbot.jointstate.ve
 
 Monitors {
 
-  link_lost     = monitor { when = no(settled), event = "e_link_lost", repeat_every = AGAIN },
+  -- Where the drives do not take torques nobody couples, and nobody asks for the link.
+  link_lost     = monitor { when = all { torques, no(settled) }, event = "e_link_lost", repeat_every = AGAIN },
   qos_ok        = monitor { when = all { settled, good }, event = "e_qos_ok", repeat_every = AGAIN },
   qos_degraded  = monitor { when = degraded, event = "e_qos_degraded", repeat_every = AGAIN },
   qos_restored  = monitor { when = all { rise(good), degraded:within_last(0.02) }, event = "e_qos_restored" },
@@ -76,7 +81,7 @@ Monitors {
   overspeed = monitor { when = above(fastest, 1.5), event = "e_overspeed", repeat_every = AGAIN },
   -- The acceptance motion is never so fast for so long: the arm gives way to whoever pushes it, too slowly for the limit above.
   carried_off = monitor { description = "an arm that takes torques is carried off",
-    when = all { equals("youbot.control_mode", 6), above(fastest, 0.8):for_at_least(0.05) },
+    when = all { torques, above(fastest, 0.8):for_at_least(0.05) },
     event = "e_overspeed", repeat_every = AGAIN },
   base_overspeed = monitor { when = above(norm { "youbot.odometry.vx", "youbot.odometry.vy" }, 0.6),
     event = "e_base_overspeed", repeat_every = AGAIN },
@@ -88,11 +93,11 @@ Monitors {
     when = any { above(max { "youbot.driver_state.pd_send_err", "youbot.driver_state.pd_recv_err" }, 100),
                  driver_lost },
     event = "e_EC_TIMEOUT", repeat_every = AGAIN },
-  controller_lost = monitor { description = "the impedance controller, which writes in every update, is not heard",
-    when = silent("Cart_Impedance.active", DEAD),
+  controller_lost = monitor { description = "the impedance controller, which writes in every update, is not heard by drives that take torques",
+    when = all { commanded, silent("Cart_Impedance.active", DEAD) },
     event = "e_controller_lost", repeat_every = AGAIN },
   control_lost = monitor { description = "another part of the control loop, which writes in every update, is not heard by drives that take torques",
-    when = all { equals("youbot.control_mode", 6),
+    when = all { commanded,
                  any { silent("Arm_Kinematics.tool_pose", DEAD), silent("Dynamics.tau_sat", DEAD),
                        silent("Base_Ctrl.cmd_twist", DEAD) } },
     event = "e_control_lost", repeat_every = AGAIN },

@@ -4,6 +4,8 @@ local function of(word) return robot .. "/" .. word end
 local place = "place_" .. robot
 local close, out, gone = "e_" .. robot .. "_close", "e_" .. robot .. "_out", "e_" .. robot .. "_gone"
 local unplaced = "e_" .. robot .. "_unplaced"
+-- What the world shows of its arm (`body`: which of the world's two it is) is told to it: its own driver may be dead.
+local fell = "e_" .. body .. "_fell"
 
 return state {
 
@@ -41,6 +43,7 @@ return state {
   trans { src = "placing",  tgt = "placed",   events = { place .. ".ok" } },
   trans { src = "placing",  tgt = "unplaced", events = { place .. ".failed", place .. ".broken" } },
   trans { src = "placing",  tgt = "lifting",  events = { of "e_leaving" } },
+  trans { src = "placed",   tgt = "placed",   events = { fell }, effect = of "e_arm_fell" },
   trans { src = "placed",   tgt = "lifting",  events = { of "e_leaving" } },
   trans { src = "unplaced", tgt = "lifting",  events = { of "e_leaving" } },
   trans { src = "tied",     tgt = "lifting",  events = { of "e_leaving", "e_shutdown" } },

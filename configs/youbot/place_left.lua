@@ -1,2 +1,2 @@
-robot = "left"
+robot, body = "left", "robot1"
 return rfsm.load("place.lua")

@@ -1,2 +1,2 @@
-robot = "right"
+robot, body = "right", "robot2"
 return rfsm.load("place.lua")

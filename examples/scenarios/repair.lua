@@ -14,6 +14,7 @@ local DEAD = {
 }
 
 deploy("../../deployments/youbot_coupling.yaml")
+set("left/Operator.script", "free 1.5; align 600", { force = true, within = 1 })      -- nobody sways it meanwhile
 for axis = 0, 2 do signal("World.robot1_tool_pose.p[" .. axis .. "]") end
 local function place()
   local p = {}

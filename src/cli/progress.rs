@@ -117,7 +117,7 @@ struct Screen {
     json: bool,
     /// When what was told last happened.
     at: f64,
-    /// It is being stopped: what components report is told too.
+    /// It is being stopped: all that components report is told; before, what is of safety.
     stopping: bool,
     /// What they reported, and when that was told last: one that goes on reporting is told now and then.
     reported: BTreeMap<String, f64>,
@@ -242,7 +242,9 @@ impl Screen {
             }
             Happening::Printed { text } => self.line(format!("{time}  {}  {text}", out.paint(Style::Dim, ".."))),
             Happening::Phase { phase } => self.stopping |= *phase == Phase::ShuttingDown,
-            Happening::Event { event, from } if self.stopping && !COMMANDERS.contains(&from.as_str()) => {
+            Happening::Event { event, from, safety }
+                if *safety || self.stopping && !COMMANDERS.contains(&from.as_str()) =>
+            {
                 let before = self.reported.insert(event.clone(), entry.at);
                 if before.is_some_and(|before| entry.at < before + limits::REPORTED_AGAIN.as_secs_f64()) {
                     self.reported.insert(event.clone(), before.unwrap_or(entry.at));

@@ -182,6 +182,8 @@ pub(super) enum UrgentCommand {
     Hurry,
     /// A coordinator has come to its *down* state.
     Down(Requester),
+    /// The configurator's thread is to panic: a script tries that.
+    Panic,
 }
 
 /// Waits until what is being done has an end, or gives way.

@@ -21,7 +21,7 @@ use crate::time::{Clock, Receiver, RecvError, Time};
 use rustc_hash::{FxHashMap, FxHashSet};
 use smallvec::SmallVec;
 use std::collections::{BTreeSet, VecDeque};
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
@@ -276,9 +276,7 @@ impl Engine {
     fn at_once(&mut self, command: UrgentCommand) {
         match command {
             // How things stand can be told at any time.
-            UrgentCommand::View { system, reply } => {
-                let _ = reply.try_send(self.view(system));
-            }
+            UrgentCommand::View { system, reply } => _ = reply.try_send(self.view(system)),
             UrgentCommand::Define { configuration, listed, reply } => {
                 self.given.define(*configuration, listed, &mut self.switches);
                 let _ = reply.try_send(());
@@ -286,6 +284,8 @@ impl Engine {
             UrgentCommand::Stopping => self.stopping_begins(),
             // To have it come is all: who waits looks whether force is wanted.
             UrgentCommand::Hurry => {}
+            // It is no defect of the place it comes from.
+            UrgentCommand::Panic => resume_unwind(Box::new("a panic was injected".to_owned())),
             // Stands in its coordinator's queue like a request.
             UrgentCommand::Down(requester) => {
                 let request = Request { why: Why::Down, ..Request::new(RequestId(0), Ask::Undo, requester) };

@@ -241,6 +241,11 @@ impl ConfiguratorHandle {
         answer
     }
 
+    /// Its thread panics, in the middle of whatever it does: for a script that tries it. Whether there was room to say so.
+    pub fn inject_panic(&self) -> bool {
+        self.inner.post.inject_panic()
+    }
+
     /// The third stage is wanted: what takes its time breaks off.
     pub fn hurry(&self) {
         self.inner.post.hurry();

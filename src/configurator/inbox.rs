@@ -198,6 +198,11 @@ impl Post {
         reserve(count, 1, bound) && self.sender.try_send(Mail::Command(command)).is_ok()
     }
 
+    /// Has the thread panic; whether there was room to say so.
+    pub fn inject_panic(&self) -> bool {
+        self.command(UrgentCommand::Panic)
+    }
+
     /// Says that force is wanted. That is known also when there is no room to wake whoever waits: then there is much to take in.
     pub fn hurry(&self) {
         self.counts.hurried.store(true, Ordering::Release);

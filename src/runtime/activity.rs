@@ -209,11 +209,17 @@ impl ActivityThread {
             if std::mem::take(&mut rounds.idle) {
                 rounds.release = rounds.release.max(now);
             }
-            let release = rounds.release;
+            let mut release = rounds.release;
             if now < release {
                 return TaskWait::Wait(release);
             }
             let late = now.since(release);
+            if late >= period {
+                // An operation took long, or the thread came late: what is past is missed but for the newest, so that no two rounds come at once.
+                let missed = (now.0 - release.0) / step;
+                self.counters.overruns.fetch_add(missed, Ordering::Relaxed);
+                release = Time(release.0.saturating_add(missed.saturating_mul(step)));
+            }
             self.counters.latency_last.store(nanos(late), Ordering::Relaxed);
             self.counters.latency_max.fetch_max(nanos(late), Ordering::Relaxed);
             self.round(now, &mut rounds.schedule, |cell| {
@@ -283,8 +289,8 @@ impl ActivityThread {
     }
 
     #[inline]
-    fn update(&self, cell: &Arc<Cell>, mut inside: CellGuard<'_>, now: Time, release: Time, first: f64) {
-        let fault = inside.update(&self.clock, now, release, first).err();
+    fn update(&self, cell: &Arc<Cell>, mut inside: CellGuard<'_>, now: Time, release: Time, period: f64) {
+        let fault = inside.update(&self.clock, now, release, period).err();
         self.leave(cell, inside, fault);
     }
 

@@ -120,13 +120,12 @@ impl CellGuard<'_> {
         self.with(|_, body| body.take())
     }
 
-    /// One update at a release. Its fault, if it has one. `first`: seconds that count as passed before the first one.
+    /// One update at a release. Its fault, if it has one. `period`: seconds that count as passed before the first one.
     #[inline]
-    pub(crate) fn update(&mut self, clock: &Clock, now: Time, release: Time, first: f64) -> Result<(), String> {
+    pub(crate) fn update(&mut self, clock: &Clock, now: Time, release: Time, period: f64) -> Result<(), String> {
         self.with(|cell, body| {
             cell.beat.set_now(now);
-            let elapsed = cell.elapsed(release);
-            let mut cx = Context::new(clock, &cell.beat, elapsed.unwrap_or(first), elapsed.is_none());
+            let mut cx = Context::of_update(clock, &cell.beat, cell.elapsed(release), period);
             let Some(body) = body else { return Ok(()) };
             guard::call(|| body.update(&mut cx))?;
             match cx.fault.take() {
@@ -140,7 +139,7 @@ impl CellGuard<'_> {
     pub(crate) fn hook(&mut self, clock: &Clock, transition: Transition) -> Result<HookResult, String> {
         self.with(|cell, body| {
             cell.beat.set_now(clock.now());
-            let mut cx = Context::new(clock, &cell.beat, 0.0, false);
+            let mut cx = Context::new(clock, &cell.beat);
             let Some(body) = body else { return Ok(Ok(())) };
             let result = guard::call(|| body.hook(transition, &mut cx))?;
             match cx.fault.take() {
@@ -165,7 +164,7 @@ fn operate(
 ) -> CallEnded {
     cell.beat.set_now(clock.now());
     let to = call.0.clone();
-    let mut cx = Context::of_call(clock, &cell.beat, call);
+    let mut cx = Context::of_call(clock, &cell.beat, call, cell.state() == RunState::Faulted);
     let result = match body {
         None => Ok(Some(Reply::Refused("the component is gone".to_owned()))),
         Some(body) => guard::call(|| match asked {

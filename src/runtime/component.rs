@@ -198,8 +198,11 @@ pub struct Context<'a> {
     clock: &'a Clock,
     beat: &'a Arc<Beat>,
     dt: f64,
+    period: f64,
     first: bool,
     pub(crate) fault: Option<String>,
+    /// Whether it has failed: asked of a call of an operation.
+    faulted: bool,
     call: Option<Responder>,
     /// The call that this is, if it is one of an operation.
     progress: Option<Arc<CallProgress>>,
@@ -207,13 +210,30 @@ pub struct Context<'a> {
 
 impl<'a> Context<'a> {
     #[inline]
-    pub(crate) fn new(clock: &'a Clock, beat: &'a Arc<Beat>, dt: f64, first: bool) -> Self {
-        Self { clock, beat, dt, first, fault: None, call: None, progress: None }
+    pub(crate) fn new(clock: &'a Clock, beat: &'a Arc<Beat>) -> Self {
+        Self {
+            clock,
+            beat,
+            dt: 0.0,
+            period: 0.0,
+            first: false,
+            fault: None,
+            faulted: false,
+            call: None,
+            progress: None,
+        }
     }
 
-    pub(crate) fn of_call(clock: &'a Clock, beat: &'a Arc<Beat>, call: Responder) -> Self {
+    /// Of an update: `dt` seconds after the last one, none: it is the first.
+    #[inline]
+    pub(crate) fn of_update(clock: &'a Clock, beat: &'a Arc<Beat>, dt: Option<f64>, period: f64) -> Self {
+        Self { dt: dt.unwrap_or(period), period, first: dt.is_none(), ..Self::new(clock, beat) }
+    }
+
+    /// Of the call of an operation. `faulted`: the component has failed before.
+    pub(crate) fn of_call(clock: &'a Clock, beat: &'a Arc<Beat>, call: Responder, faulted: bool) -> Self {
         let progress = Some(call.0.clone());
-        Self { call: Some(call), progress, ..Self::new(clock, beat, 0.0, false) }
+        Self { call: Some(call), faulted, progress, ..Self::new(clock, beat) }
     }
 
     /// The answering end, unless a ticket has it.
@@ -231,6 +251,12 @@ impl<'a> Context<'a> {
     /// updates' moments, 0 at the first.
     pub fn dt(&self) -> f64 {
         self.dt
+    }
+
+    /// Seconds between two updates where none is missed: the period of a periodic activity; 0 in an event-driven one, and where this is no
+    /// update.
+    pub fn period(&self) -> f64 {
+        self.period
     }
 
     /// Whether this is the first update since the component was started.
@@ -268,6 +294,12 @@ impl<'a> Context<'a> {
     /// answers later looks at [`Ticket::is_cancelled`] instead. In hooks and updates always false: they cannot be given up.
     pub fn is_cancelled(&self) -> bool {
         self.progress.as_ref().is_some_and(|progress| progress.is_told())
+    }
+
+    /// Inside an operation: whether the component has failed before, and is not updated any more. What it answers then is not done by anybody: who
+    /// drives something refuses.
+    pub fn is_faulted(&self) -> bool {
+        self.faulted
     }
 
     /// Inside an operation: the means to answer later. The operation then answers [`OperationAnswer::Pending`].

@@ -88,6 +88,11 @@ impl StoppingState {
         Self { safety: safety.into_iter().collect(), safe, state: Mutex::default() }
     }
 
+    /// Whether an event is declared as one of safety.
+    pub fn is_safety(&self, event: EventName) -> bool {
+        self.safety.contains(&event)
+    }
+
     pub fn begin(&self) {
         lock(&self.state).began = true;
     }

@@ -40,6 +40,9 @@ pub enum Happening {
         event: String,
         /// Who raised it: `operator`, a component, `configurator`.
         from: String,
+        /// A component raised it, and it is one of safety: told to people whatever else is.
+        #[serde(skip)]
+        safety: bool,
     },
     /// The coordinator raised an event that leaves the deployment.
     Emitted {

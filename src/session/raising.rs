@@ -120,7 +120,7 @@ impl Session {
                 Err(NotAccepted::Detached) => gone = true,
             }
         }
-        self.hub().note(Happening::Event { event: event.to_string(), from: from.to_owned() });
+        self.hub().note(Happening::Event { event: event.to_string(), from: from.to_owned(), safety: false });
         self.configurator().event(event);
         self.junction().tell_leaving(self.configurator(), event);
         let acted = make_safe(self.hub(), self.configurator(), event, Class::Outside);

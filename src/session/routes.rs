@@ -178,7 +178,11 @@ impl Listener for ToConfigurator {
                 Meaning::UnknownUndo(name) => {
                     // There is no such ID: answered at once, as the table of requests says.
                     let event = EventName::new(&format!("{name}.failed")).expect("an event with a suffix is one");
-                    self.hub.note(Happening::Event { event: event.to_string(), from: "configurator".to_owned() });
+                    self.hub.note(Happening::Event {
+                        event: event.to_string(),
+                        from: "configurator".to_owned(),
+                        safety: false,
+                    });
                     self.deliver(Incoming::new(Class::Notice, event).tagged(Some(Tag::from(*raised))));
                 }
                 Meaning::Unknown(name) => self.hub.note(Happening::Forced {
@@ -438,7 +442,7 @@ pub(super) fn on_platform(hub: &Hub, junction: &Junction, event: &PlatformEvent)
         hub.note(Happening::Forced { note: format!("`{event}` of `{from}` is passed over: {NO_MORE}") });
         return;
     }
-    hub.report(Happening::Event { event: event.to_string(), from });
+    hub.report(Happening::Event { event: event.to_string(), from, safety: hub.is_safety(event) });
     hub.halt().report(event);
     if let Some(configurator) = &configurator {
         junction.tell_leaving(configurator, event);

@@ -279,7 +279,7 @@ impl Subsystems {
         };
         let Some(told) = told else { return };
         let event = told.event(known.path);
-        hub.note(Happening::Event { event: event.to_string(), from: known.path.to_string() });
+        hub.note(Happening::Event { event: event.to_string(), from: known.path.to_string(), safety: false });
         junction.give_to(hub, known.parent, Incoming::new(Class::Report, event));
     }
 
@@ -329,7 +329,7 @@ impl Subsystems {
         });
         for of in ignored {
             let event = EventName::new(&format!("{}{IGNORED}", of.event)).expect("an event with a suffix is one");
-            hub.note(Happening::Event { event: event.to_string(), from: "configurator".to_owned() });
+            hub.note(Happening::Event { event: event.to_string(), from: "configurator".to_owned(), safety: false });
             if let Some(coordinator) = junction.coordinator(of.by) {
                 hub.taken(coordinator.deliver(Incoming::new(Class::Notice, event).tagged(of.tag)));
             }

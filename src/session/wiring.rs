@@ -76,7 +76,13 @@ impl Session {
         let emits = deployment.emits.iter().map(|(event, _)| *event).chain(between(&charts));
         let hub = Hub::new(&clock, deployment.configurations.iter().map(|c| c.id), emits);
         let safe = deployment.configurations.iter().filter(|c| c.safe).map(|c| c.id).collect();
-        let hub = Arc::new(hub.with_safety(deployment.safety.iter().map(|(event, _)| *event), safe));
+        let hub = hub.with_safety(deployment.safety.iter().map(|(event, _)| *event), safe);
+        let hub =
+            Arc::new(hub.with_safety_inside(
+                deployment.all_subsystems().iter().flat_map(|(path, subsystem)| {
+                    subsystem.own.safety.iter().map(move |(event, _)| event.within(*path))
+                }),
+            ));
         let subsystems = Arc::new(Subsystems::new(&deployment, &clock));
         let junction = Arc::new(Junction::new(&deployment, subsystems.clone()));
         let steps = Arc::new(Steps::default());
@@ -149,6 +155,11 @@ impl Session {
 
     pub(super) fn configurator(&self) -> &ConfiguratorHandle {
         &self.configurator
+    }
+
+    /// Has the configurator's thread panic, in the middle of whatever it does. Whether there was room to say so.
+    pub fn inject_configurator_panic(&self) -> bool {
+        self.configurator.inject_panic()
     }
 
     /// Its memory: log, observers, what was heard.

@@ -25,6 +25,8 @@ impl Component for Slow {
 
     fn update(&mut self, cx: &mut Context) {
         log::note(cx.clock(), format!("{} {} dt {}", cx.name(), cx.now().as_nanos() / 1_000_000, cx.dt() * 1e3));
+        // What is missed is no part of it: 10 ms, and 1 ms where a thread is looked for.
+        assert!([0.01, 0.001].contains(&cx.period()), "{}", cx.period());
         let takes = self.takes_ms.get();
         if takes < 0 {
             cx.clock().hang();
@@ -58,6 +60,20 @@ fn a_period_is_kept_and_what_is_missed_is_counted() {
     assert_eq!((status.cycles, status.overruns), (7, 4));
     assert_eq!((status.latency_max, status.duration_max), (Duration::ZERO, MS * 25));
     assert_eq!((status.components, status.running, status.stuck), (1, 1, None));
+}
+
+/// Between two rounds is what their `dt` says: whoever bounds what it changes in one does not do it twice at once.
+#[test]
+fn behind_a_long_operation_comes_one_round_for_all_that_is_missed() {
+    let b = bench(library());
+    b.create("s", "Slow", "slow", &[]);
+    b.start(&["s"]);
+    b.wait(MS * 12);
+    let stall = davit::model::Injection::Stall { time: MS * 25 };
+    b.platform.inject(name("s"), &stall, b.clock.now() + MS * 5).unwrap();
+    b.wait(MS * 33);
+    assert_eq!(log::take(&b.clock), ["s 0 dt 10", "s 10 dt 10", "s 37 dt 20", "s 40 dt 10"]);
+    assert_eq!(b.platform.activities()[0].overruns, 1);
 }
 
 #[test]

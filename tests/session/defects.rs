@@ -44,7 +44,7 @@ fn a_stage_that_panics_is_left_to_the_next() {
     panics_at(&small, |what| matches!(what, Happening::Phase { phase: Phase::Deploying }));
     panics_at(
         &small,
-        |what| matches!(what, Happening::Event { event, from } if event == "e_stop" && from == "deployment"),
+        |what| matches!(what, Happening::Event { event, from, .. } if event == "e_stop" && from == "deployment"),
     );
     small.session.guarded(|| small.session.bring_up()).expect_err("it panics");
     small.is_empty();
@@ -52,7 +52,7 @@ fn a_stage_that_panics_is_left_to_the_next() {
     let small = Small::up("lowering");
     panics_at(
         &small,
-        |what| matches!(what, Happening::Event { event, from } if event == "e_stop" && from == "deployment"),
+        |what| matches!(what, Happening::Event { event, from, .. } if event == "e_stop" && from == "deployment"),
     );
     let (ended, _) = small.stop();
     assert!(ended.stage == Stage::TakenBack && ended.is_clean(), "{ended:?}");

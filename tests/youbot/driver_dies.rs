@@ -3,11 +3,22 @@
 use crate::scenarios::script;
 use std::path::Path;
 
-#[test]
-fn it_is_noticed_and_nothing_couples() {
-    let end = script(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/youbot/driver_dies.lua"), &[]);
-    assert_eq!(end.figures.len(), 3);
+fn run(name: &str, set: &[(&str, &str)], figures: usize) {
+    let end = script(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/youbot").join(name), set);
+    assert_eq!(end.figures.len(), figures);
     // Its arm cannot be led down: that is left to somebody who holds it.
     let ended = end.ended.expect("it deployed something");
     assert!(!ended.is_clean(), "{ended:?}");
+}
+
+#[test]
+fn it_is_noticed_and_nothing_couples() {
+    run("driver_dies.lua", &[], 3);
+}
+
+#[test]
+fn it_is_noticed_wherever_the_drives_have_power() {
+    for place in ["fault", "halted", "calibrating", "unfolding"] {
+        run("driver_dies_elsewhere.lua", &[("where", place)], 1);
+    }
 }

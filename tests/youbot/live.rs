@@ -118,11 +118,7 @@ fn probed(id: i64, change: impl Fn(String) -> String) -> String {
     let text = behind(&text, "\n  connect_all = Configuration(with_stand_in({", &each("connect"));
     let text = behind(&text, "disconnect_all = Configuration(with_stand_in({", &each("disconnect"));
     let text = behind(&text, "destroy_all = Configuration(with_stand_in({", "destroy(\"Probe\"),");
-    change(behind(
-        &text,
-        "post_conf_state = stand_in and { \"World:running\", \"youbot:running\"",
-        ", \"Probe:running\"",
-    ))
+    change(behind(&text, "post_conf_state = with_world{\n      \"youbot:running\",", "\n      \"Probe:running\","))
 }
 
 /// A file with the probe in it, read and checked once for all that want the same, one after the other: to check it takes

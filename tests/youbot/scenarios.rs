@@ -8,19 +8,23 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Each with what is set for it here: what takes a minute in the file is shorter.
-const SCENARIOS: [(&str, &[(&str, &str)]); 21] = [
+const SCENARIOS: [(&str, &[(&str, &str)]); 25] = [
     ("blocked", &[]),
     ("bring_up", &[]),
+    ("configurator", &[]),
     ("crash", &[]),
     ("driver", &[]),
     ("energy", &[]),
     ("engaged_in_motion", &[]),
     ("estop", &[]),
     ("hang", &[]),
+    ("late", &[]),
     ("link", &[]),
     ("modes", &[]),
     ("one_stops", &[]),
+    ("one_way", &[]),
     ("peer_restart", &[]),
+    ("pressed", &[]),
     ("push", &[]),
     ("refused", &[]),
     ("repair", &[]),
@@ -86,6 +90,11 @@ fn bring_up() {
 }
 
 #[test]
+fn configurator() {
+    run("configurator");
+}
+
+#[test]
 fn crash() {
     run("crash");
 }
@@ -116,6 +125,11 @@ fn hang() {
 }
 
 #[test]
+fn late() {
+    run("late");
+}
+
+#[test]
 fn link() {
     run("link");
 }
@@ -126,6 +140,11 @@ fn modes() {
 }
 
 #[test]
+fn one_way() {
+    run("one_way");
+}
+
+#[test]
 fn one_stops() {
     run("one_stops");
 }
@@ -133,6 +152,11 @@ fn one_stops() {
 #[test]
 fn peer_restart() {
     run("peer_restart");
+}
+
+#[test]
+fn pressed() {
+    run("pressed");
 }
 
 #[test]

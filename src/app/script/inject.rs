@@ -1,5 +1,5 @@
 //! `inject("drive", "overcurrent", { joint = 2 }, now() + 0.5)`: a fault put straight into a component, now or at a given time of
-//! the clock, whatever is under way then.
+//! the clock, whatever is under way then. `inject("configurator", "panic")` is one in the configurator itself.
 
 use super::{SharedHost, clock, error, figures, session, values};
 use crate::limits;
@@ -13,11 +13,33 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, Weak};
 use std::time::Duration;
 
-/// A fault that is to be put into a component.
+/// What a fault is put into.
+#[derive(Clone)]
+enum InjectionTarget {
+    Component(ComponentName, Injection),
+    /// The configurator, whose thread panics.
+    Configurator,
+}
+
+/// As the log names the configurator, and a script: where the deployment creates a component of that name it is that.
+const CONFIGURATOR: &str = "configurator";
+/// The one fault that it knows.
+const PANIC: &str = "panic";
+
+impl InjectionTarget {
+    /// The names of what it is put into, and of what is.
+    fn words(&self) -> (String, String) {
+        match self {
+            Self::Component(component, injection) => (component.to_string(), injection.to_string()),
+            Self::Configurator => (CONFIGURATOR.to_owned(), PANIC.to_owned()),
+        }
+    }
+}
+
+/// A fault that is to be put into something.
 #[derive(Clone)]
 struct PlannedInjection {
-    component: ComponentName,
-    injection: Injection,
+    target: InjectionTarget,
     /// The line of the script that wants it.
     place: String,
 }
@@ -54,11 +76,9 @@ impl Injector {
         let planned = std::mem::take(&mut state.planned);
         let mut failed = std::mem::take(&mut state.failed);
         failed.extend(planned.into_iter().map(|((at, _), planned)| {
-            let PlannedInjection { component, injection, place } = planned;
-            let at = at.as_secs_f64();
-            format!(
-                "{place}: `{injection}` was to happen to `{component}` at {at} s, and the deployment was down before"
-            )
+            let (target, fault) = planned.target.words();
+            let (at, place) = (at.as_secs_f64(), planned.place);
+            format!("{place}: `{fault}` was to happen to `{target}` at {at} s, and the deployment was down before")
         }));
         drop(state);
         self.wake.notify();
@@ -96,12 +116,20 @@ fn live(clock: &Clock, state: &Mutex<InjectorState>, wake: &Signal, session: &We
 }
 
 fn happen(session: &Session, planned: &PlannedInjection) -> Result<(), String> {
-    let PlannedInjection { component, injection, .. } = planned;
+    let (target, fault) = planned.target.words();
     // Told before it happens: what comes of it stands behind it.
-    session.hub().note(Happening::Injected { component: component.to_string(), fault: injection.to_string() });
-    let deadline = session.clock().now() + limits::INJECTION;
-    let done = session.platform().inject(*component, injection, deadline);
-    done.map_err(|why| format!("`{injection}` could not be injected into `{component}`: {why}"))
+    session.hub().note(Happening::Injected { component: target.clone(), fault: fault.clone() });
+    let done = match &planned.target {
+        InjectionTarget::Component(component, injection) => {
+            let deadline = session.clock().now() + limits::INJECTION;
+            session.platform().inject(*component, injection, deadline)
+        }
+        InjectionTarget::Configurator => match session.inject_configurator_panic() {
+            true => Ok(()),
+            false => Err("too much waits for it".to_owned()),
+        },
+    };
+    done.map_err(|why| format!("`{fault}` could not be injected into `{target}`: {why}"))
 }
 
 pub(super) fn inject(
@@ -114,8 +142,7 @@ pub(super) fn inject(
 ) -> mlua::Result<()> {
     let session = session(host)?;
     let given = parameters(given)?;
-    let (component, injection) = known(host, component, what, &given)?;
-    let planned = PlannedInjection { component, injection, place: figures::place(lua) };
+    let planned = PlannedInjection { target: known(host, component, what, &given)?, place: figures::place(lua) };
     let Some(at) = at else { return happen(&session, &planned).map_err(error) };
     let now = clock(host).now();
     if !(at.is_finite() && (0.0..=1e9).contains(&at) && at >= now.as_secs_f64()) {
@@ -159,17 +186,21 @@ fn parameters(given: Option<LuaValue>) -> mlua::Result<Vec<(String, Value)>> {
     table.pairs().map(one).collect()
 }
 
-/// The component, as one of the types as which the deployment creates it, and what is meant to happen to it.
-fn known(
-    host: &SharedHost,
-    component: &str,
-    what: &str,
-    given: &[(String, Value)],
-) -> mlua::Result<(ComponentName, Injection)> {
+/// The component, as one of the types as which the deployment creates it, and what is meant to happen to it; or the configurator.
+fn known(host: &SharedHost, component: &str, what: &str, given: &[(String, Value)]) -> mlua::Result<InjectionTarget> {
     let host = host.borrow();
     let types: Vec<(ComponentName, Arc<ComponentType>)> = host.faults.created();
     let mut of = types.iter().filter(|(name, _)| name.as_str() == component).peekable();
     if of.peek().is_none() {
+        if component == CONFIGURATOR {
+            return match what == PANIC && given.is_empty() {
+                true => Ok(InjectionTarget::Configurator),
+                false => Err(error(
+                    "the configurator knows one fault, without parameters: `inject(\"configurator\", \"panic\")`"
+                        .to_owned(),
+                )),
+            };
+        }
         let known = types.iter().map(|(name, _)| name.as_str());
         let help = did_you_mean(component, "components", known);
         return Err(error(format!("no configuration creates a component `{component}`: {help}")));
@@ -177,7 +208,7 @@ fn known(
     let mut wrong: Option<NoInjection> = None;
     for (name, ty) in of {
         match Injection::of(ty, what, given) {
-            Ok(injection) => return Ok((*name, injection)),
+            Ok(injection) => return Ok(InjectionTarget::Component(*name, injection)),
             Err(why) => _ = wrong.get_or_insert(why),
         }
     }

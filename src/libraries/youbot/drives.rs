@@ -9,6 +9,7 @@ use super::plant::joint_ranges;
 use super::rigid_body::{ArmModel, J5, radians};
 use task::DriveTask;
 
+mod stopping;
 mod task;
 
 /// What the drives do; numbers as in the KU Leuven driver.
@@ -107,6 +108,8 @@ pub struct Measured {
     pub q: J5,
     /// Speeds, in rad/s.
     pub qd: J5,
+    /// How the base moves, in its frame.
+    pub base: Twist2,
 }
 
 /// What the drives do in the next period.
@@ -152,7 +155,7 @@ pub struct Drives {
 impl Drives {
     /// Drives off, not calibrated, of an arm that is at `q`.
     pub fn new(q: J5) -> Self {
-        let (measured, target) = (Measured { q, qd: J5::zeros() }, q);
+        let (measured, target) = (Measured { q, ..Measured::default() }, q);
         Self {
             model: ArmModel::youbot(GRIPPER.mass, 1.0),
             measured,
@@ -326,6 +329,7 @@ impl Drives {
         };
         torque = self.handover.over(&torque, &self.torque, dt);
         if self.mode == DriveMode::Torque {
+            // Behind a period that was missed that is more than it was: it brakes a little early.
             let gained = (self.measured.qd - self.last_speed) / dt;
             torque = within_speed(&torque, &self.measured.qd, &gained, &self.parameters.tau_max);
         }
@@ -381,6 +385,17 @@ impl Drives {
             self.outside = false;
             report(DriveHappening::SoftLimitExit);
         }
+    }
+
+    /// Whether they give torque.
+    pub fn has_power(&self) -> bool {
+        self.mode != DriveMode::MotorStop
+    }
+
+    /// They were off, whatever was asked of them, with the arm as it was `measured` now.
+    pub fn lose_power(&mut self, measured: Measured) {
+        self.measured = measured;
+        self.torque = J5::zeros();
     }
 
     /// Switches the drives off; whether the arm stays where it is, or nearly so.

@@ -1,6 +1,5 @@
 //! What the drives' electronics make of what is there and of what is wanted: encoders that count, and motors that must not get too hot.
 
-use super::drives::Measured;
 use super::parameters::{ENCODER_TICKS, GEAR, JOINTS};
 use super::rigid_body::J5;
 
@@ -11,14 +10,14 @@ pub struct Encoders {
 }
 
 impl Encoders {
-    /// What they make of angles `q` (rad), `dt` seconds after the last time.
-    pub fn read(&mut self, q: &J5, dt: f64) -> Measured {
+    /// What they make of angles `q` (rad), `dt` seconds after the last time: angles and speeds.
+    pub fn read(&mut self, q: &J5, dt: f64) -> (J5, J5) {
         let counted = J5::from_fn(|i, _| {
             let count = std::f64::consts::TAU / (GEAR[i] * ENCODER_TICKS);
             (q[i] / count).round() * count
         });
         let before = self.last.replace(counted).unwrap_or(counted);
-        Measured { q: counted, qd: if dt > 0.0 { (counted - before) / dt } else { J5::zeros() } }
+        (counted, if dt > 0.0 { (counted - before) / dt } else { J5::zeros() })
     }
 }
 
@@ -78,9 +77,9 @@ mod tests {
         let mut encoders = Encoders::default();
         let count = std::f64::consts::TAU / (156.0 * 4000.0);
         encoders.read(&J5::repeat(0.0), 0.001);
-        let read = encoders.read(&J5::repeat(1.05 * count), 0.001);
-        assert!((read.q[0] - count).abs() < 1e-12 && (read.qd[0] - count / 0.001).abs() < 1e-9, "{read:?}");
-        assert_eq!((read.q[3], read.qd[3]), (0.0, 0.0), "half a count of a coarser one");
+        let (q, qd) = encoders.read(&J5::repeat(1.05 * count), 0.001);
+        assert!((q[0] - count).abs() < 1e-12 && (qd[0] - count / 0.001).abs() < 1e-9, "{q} {qd}");
+        assert_eq!((q[3], qd[3]), (0.0, 0.0), "half a count of a coarser one");
     }
 
     #[test]

@@ -136,6 +136,11 @@ impl RobotBody {
         Tool::of(&self.arm.model, &self.arm.q, &self.arm.qd, self.base.pose, self.base.twist)
     }
 
+    /// What the motors give now, in N m.
+    pub fn given(&self) -> &J5 {
+        &self.given
+    }
+
     /// Moves on by `dt` seconds, in steps of [`PLANT_STEP`]. `push` is a hand's force on the tool in the world, `braked`: the
     /// windings are shorted.
     pub fn advance(&mut self, torque: &J5, twist: Twist2, push: &Vector3<f64>, braked: bool, dt: f64) {

@@ -1,7 +1,7 @@
 //! `youbot.Base_Ctrl`: what the base is allowed to do.
 
-use super::aged;
 use super::samples::{Odometry, Twist};
+use super::{aged, going_on};
 use crate::libraries::youbot::base::Twist2;
 use crate::libraries::youbot::dynamics::BaseLimits;
 use crate::runtime::{Builder, Component, Context, In, OperationAnswer, Out, Prop};
@@ -63,7 +63,7 @@ impl Component for BaseCtrl {
         let known = aged(&mut self.odometry, cx).is_some_and(|(_, age)| age <= STALE);
         let may = known && self.enabled.get();
         let wish = aged(&mut self.base_twist, cx).filter(|(_, age)| may && *age <= STALE);
-        self.last = limits.limit(wish.map(|(t, _)| t.into()).unwrap_or_default(), self.last, cx.dt());
+        self.last = limits.limit(wish.map(|(t, _)| t.into()).unwrap_or_default(), self.last, going_on(cx));
         self.cmd_twist.write(self.last.into());
     }
 }

@@ -4,8 +4,8 @@ mod bus;
 mod faults;
 mod operations;
 
-use super::aged;
 use super::samples::{DriverState, JointState, MotorStates, Odometry, PlantCommand, PlantState, Twist, stamp};
+use super::{aged, going_on};
 use crate::libraries::youbot::drives::{DriveHappening, DriveMode, DriveOutput, DriveParameters, Drives, Measured};
 use crate::libraries::youbot::motors::{Encoders, HeatChange, HeatLimit};
 use crate::libraries::youbot::parameters::{GEAR, JOINTS, PARK_POSE_DEG, TORQUE_CONSTANT, TORQUE_LIMIT};
@@ -108,7 +108,7 @@ impl Component for Driver {
             let heard = aged(&mut c.plant_state, cx).filter(|(_, age)| *age <= BUS_TIMEOUT);
             c.arm_is_there = heard.is_some();
             if let Some((state, _)) = heard {
-                c.drives.measured = Measured { q: state.pos.into(), qd: state.vel.into() };
+                c.drives.measured = measured(&state);
                 c.plant = state;
             }
             c.running = true;
@@ -122,6 +122,7 @@ impl Component for Driver {
                 c.events.raise(c.names.dropped);
             }
             c.plant_command.write(PlantCommand { braked: true, ..PlantCommand::default() });
+            c.control_mode.write(c.drives.mode().number());
             Ok(())
         });
         Self::offer_operations(b);
@@ -231,6 +232,14 @@ impl Component for Driver {
             return;
         }
         self.plant = plant;
+        let (q, qd) = self.counters.read(&plant.pos.into(), cx.dt());
+        let measured = match self.encoders.get() {
+            true => Measured { q, qd, ..measured(&plant) },
+            false => measured(&plant),
+        };
+        if cx.dt() > BUS_TIMEOUT {
+            self.held_up(measured);
+        }
         self.unheard = self.again(age > BUS_TIMEOUT, self.unheard, cx.dt(), |c| _ = c.fail("ec_timeout"));
         let _ = self.gripper.take();
         if self.task.as_ref().is_some_and(Ticket::is_cancelled) {
@@ -239,12 +248,7 @@ impl Component for Driver {
             self.drives.hold();
         }
         let (events, names, task) = (&mut self.events, &self.names, &mut self.task);
-        let counted = self.counters.read(&plant.pos.into(), cx.dt());
-        let measured = match self.encoders.get() {
-            true => counted,
-            false => Measured { q: plant.pos.into(), qd: plant.vel.into() },
-        };
-        let driven = self.drives.update(measured, effort, twist, cx.dt(), &mut |what| match what {
+        let driven = self.drives.update(measured, effort, twist, going_on(cx), &mut |what| match what {
             DriveHappening::SoftLimit => events.raise(names.soft_limit),
             DriveHappening::SoftLimitExit => events.raise(names.soft_limit_exit),
             DriveHappening::CommandWatchdog => events.raise(names.command_watchdog),
@@ -286,6 +290,11 @@ impl Component for Driver {
         self.unwatched = self.again(lost, self.unwatched, cx.dt(), |c| c.events.raise(c.names.unwatched));
         self.publish(&plant, &driven, cx);
     }
+}
+
+/// What is measured of a robot that is so.
+fn measured(plant: &PlantState) -> Measured {
+    Measured { q: plant.pos.into(), qd: plant.vel.into(), base: plant.base.split().1 }
 }
 
 impl Driver {

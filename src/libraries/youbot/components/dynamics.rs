@@ -1,7 +1,7 @@
 //! `youbot.Dynamics`: from the wanted force to torques and a motion of the base.
 
-use super::aged;
 use super::samples::{JointState, Odometry, Twist, seconds_since};
+use super::{aged, going_on};
 use crate::libraries::youbot::dynamics::{Coupled, Dynamics, DynamicsParameters, Jacobian8};
 use crate::libraries::youbot::link::PeerState;
 use crate::libraries::youbot::parameters::GRIPPER;
@@ -150,7 +150,7 @@ impl Component for DynamicsComponent {
         let coupled = force.zip(engaged).map(|((force, _), (engaged, _))| Coupled { force, engaged, peer_yields });
         let jacobian = jacobian.map_or_else(Jacobian8::zeros, |(flat, _)| Jacobian8::from_column_slice(&flat));
         let (q, qd) = (J5::from(joints.pos), J5::from(joints.vel));
-        let out = self.law.update(&q, &qd, &jacobian, coupled.as_ref(), cx.dt());
+        let out = self.law.update(&q, &qd, &jacobian, coupled.as_ref(), going_on(cx));
         self.effort.write(out.torque);
         // The base moves only while it is known how it moves.
         let known = self.odometry.sample().is_some_and(|o| seconds_since(cx.now(), o.at) <= STALE);

@@ -1,5 +1,6 @@
 //! `youbot.Cart_Impedance`: the coupling's spring and damper.
 
+use super::going_on;
 use super::samples::{ExtRef, ToolPose, ToolTwist, stamp};
 use crate::libraries::youbot::impedance::{CouplingLaw, Impedance, ImpedanceParameters, Reference};
 use crate::model::Tunable;
@@ -148,7 +149,7 @@ impl Component for CartImpedance {
             energy: r.energy,
         });
         let coupled = self.ext_ref_mode.get().unwrap_or(false);
-        let out = self.coupling.update(&pose.p.into(), &twist.v.into(), reference.as_ref(), coupled, cx.dt());
+        let out = self.coupling.update(&pose.p.into(), &twist.v.into(), reference.as_ref(), coupled, going_on(cx));
         self.f_des.write(out.force);
         self.engaged.write(out.engaged);
         self.energy_sent.write(self.coupling.energy_sent());

@@ -29,6 +29,7 @@ pub use reporter::Reporter;
 pub use udp::Udp;
 pub use world::YoubotWorld;
 
+use crate::libraries::youbot::robot::CONTROL_PERIOD;
 use crate::runtime::{Context, In, Library, PortValue};
 use samples::seconds_since;
 
@@ -50,6 +51,14 @@ pub fn library() -> Library {
         .with::<Operator>("youbot.Operator")
         .with::<ModeSwitch>("youbot.Mode_Switch")
         .with::<Reporter>("youbot.Reporter")
+}
+
+/// How far an update takes the ramps, filters and integrators of a controller, in s: one period, however long it was held up before. What it
+/// missed it does not make up for at once; it goes on from where it was. How long something was not heard, and how fast something changed, is another
+/// question: that is asked of the clock.
+fn going_on(cx: &Context) -> f64 {
+    let period = if cx.period() > 0.0 { cx.period() } else { CONTROL_PERIOD };
+    cx.dt().min(period)
 }
 
 /// The value at a port with its age in s.

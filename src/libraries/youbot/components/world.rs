@@ -25,6 +25,7 @@ struct WorldRobot {
     tool_pose: Out<ToolPose>,
     tool_twist: Out<ToolTwist>,
     contact: Out<Vector3<f64>>,
+    torque: Out<J5>,
     q_start: Prop<J5>,
     mass_scale: Prop<f64>,
     friction_scale: Prop<f64>,
@@ -53,6 +54,10 @@ impl WorldRobot {
             tool_pose: b.doc("Where its tool truly is.").output(&named("tool_pose")),
             tool_twist: b.doc("How its tool truly moves.").output(&named("tool_twist")),
             contact: b.doc("What table, wall and bar do to its tool, in the world.").unit("N").output(&named("contact")),
+            torque: b
+                .doc("What its motors give: what its driver wants, with their lag; nothing while their windings are shorted.")
+                .unit("N m")
+                .output(&named("torque")),
             q_start: b
                 .doc("Where its arm is when the simulation begins, rad from candle.")
                 .unit("rad")
@@ -119,6 +124,7 @@ impl WorldRobot {
         self.tool_pose.write(ToolPose { p: tool.position.into(), q: tool.orientation.coords.into() });
         self.tool_twist.write(ToolTwist { v: tool.velocity.into(), w: tool.rotation_rate.into() });
         self.contact.write(self.body.contact);
+        self.torque.write(*self.body.given());
     }
 }
 
@@ -132,6 +138,8 @@ pub struct YoubotWorld {
     bar_position: Out<f64>,
     events: EventOut,
     fell: EventName,
+    /// The same of each.
+    fell_of: [EventName; 2],
     stiffness: Prop<f64>,
     damping: Prop<f64>,
 }
@@ -170,9 +178,10 @@ impl Component for YoubotWorld {
             bar_damping: b.doc("Of the bar's rails.").unit("N s/m").range(0.0..=500.0).property("bar_damping", 2.0),
             bar_position: b.doc("Where the bar is; written while there is one.").unit("m").output("bar_position"),
             events: b
-                .doc("e_arm_fell: an arm whose windings are shorted came down by more than 2 cm.")
+                .doc("e_arm_fell: an arm whose windings are shorted came down by more than 2 cm. And which: e_robot1_fell, e_robot2_fell.")
                 .event_output("events"),
             fell: b.event("e_arm_fell"),
+            fell_of: [b.event("e_robot1_fell"), b.event("e_robot2_fell")],
             stiffness: b
                 .doc("Of table, wall and bar.")
                 .unit("N/m")
@@ -196,11 +205,12 @@ impl Component for YoubotWorld {
         let (stiffness, damping) = (self.stiffness.get(), self.damping.get());
         let surroundings = Surroundings { stiffness, damping, bar: self.bar, ..Surroundings::default() };
         let mut on_bar = 0.0;
-        for place in &mut self.places {
+        for (place, fell) in self.places.iter_mut().zip(self.fell_of) {
             place.is_there |= place.state.is_connected();
             if place.is_there {
                 if place.step(cx, surroundings) {
                     self.events.raise(self.fell);
+                    self.events.raise(fell);
                 }
                 on_bar += place.body.on_bar;
                 place.publish(now);

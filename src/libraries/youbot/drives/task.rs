@@ -1,7 +1,6 @@
 //! What the drives are at by themselves: a motion from one pose to another, or looking for the stops.
 
 use super::{DriveHappening, DriveMode, Drives, JOINTS, RANGE_LOWER_DEG, RANGE_UPPER_DEG};
-use crate::libraries::youbot::handover::slowed;
 use crate::libraries::youbot::rigid_body::J5;
 
 /// Peak joint speed of folding and unfolding, in rad/s.
@@ -72,10 +71,7 @@ impl Drives {
 
     pub(super) fn advance_task(&mut self, dt: f64, report: &mut impl FnMut(DriveHappening)) {
         match &mut self.task {
-            DriveTask::Idle => {
-                self.target_speed = slowed(&self.target_speed, dt);
-                self.target += self.target_speed * dt;
-            }
+            DriveTask::Idle => self.come_to_rest(dt),
             DriveTask::Moving { from, to, elapsed, duration, behind, fails } => {
                 *elapsed += dt;
                 let s = (*elapsed / *duration).min(1.0);

@@ -37,7 +37,7 @@ impl Driving {
         dt: f64,
         report: &mut impl FnMut(DriveHappening),
     ) {
-        let measured = Measured { q: self.body.arm.q, qd: self.body.arm.qd };
+        let measured = Measured { q: self.body.arm.q, qd: self.body.arm.qd, base: self.body.base.twist };
         let driven = self.drives.update(measured, effort, twist, dt, report);
         self.body.advance(&driven.torque, driven.twist, push, driven.braked, dt);
     }
@@ -300,4 +300,65 @@ fn what_holds_a_pushed_arm_back_comes_by_a_ramp() {
             assert!(joints.0 == 0.0 || fastest < 0.02, "{joints:?}, {push:?}: {fastest} m/s 0.3 s after it braked");
         }
     }
+}
+
+/// In contact it presses with no more than it did, whatever rolls out under it.
+#[test]
+fn a_stop_does_not_drive_on_into_what_it_meets() {
+    let mut drives = up();
+    let effort = |drives: &Driving| drives.body.arm.model.gravity(&drives.body.arm.posture());
+    drives.set_mode(DriveMode::Torque).unwrap();
+    drives.body.surroundings.wall = drives.body.tool().position.x + 0.005;
+    // The base takes the arm along, and goes on for a while when it is stopped.
+    let rolls = Twist2 { vx: 0.1, ..Twist2::default() };
+    let mut meets = None;
+    for tick in 0..1000 {
+        let effort = effort(&drives);
+        drives.update(Some((effort, 0.0)), Some((rolls, 0.0)), &Vector3::zeros(), 0.001, &mut |_| ());
+        if drives.body.contact.norm() > 1.0 {
+            meets = Some(tick);
+            break;
+        }
+    }
+    assert!(meets.is_some(), "it meets the wall");
+    drives.brake();
+    let mut most: f64 = 0.0;
+    for tick in 0..2000 {
+        drives.update(None, None, &Vector3::zeros(), 0.001, &mut |_| ());
+        if tick >= 300 {
+            most = most.max(drives.body.contact.norm());
+        }
+    }
+    assert!(most < 10.0, "{most} N");
+}
+
+/// Whatever was asked of drives that were off, their torques begin from none.
+#[test]
+fn behind_a_loss_of_power_torques_begin_from_none() {
+    let mut drives = up();
+    assert!(drives.torque.amax() > 2.0, "it carries the arm: {}", drives.torque);
+    for _ in 0..200 {
+        drives.body.advance(&J5::zeros(), Twist2::default(), &Vector3::zeros(), true, 0.001);
+    }
+    let measured = Measured { q: drives.body.arm.q, qd: drives.body.arm.qd, ..Measured::default() };
+    drives.lose_power(measured);
+    drives.hold();
+    let mut last = J5::zeros();
+    for tick in 0..1000 {
+        drives.update(None, None, &Vector3::zeros(), 0.001, &mut |_| ());
+        assert!((drives.torque - last).amax() <= 0.5, "{tick} ms: {last} {}", drives.torque);
+        last = drives.torque;
+    }
+    assert!((drives.body.arm.q - measured.q).amax() < 0.05, "{} {}", drives.body.arm.q, measured.q);
+    assert!(drives.body.arm.qd.amax() < 1e-3);
+}
+
+/// Unfolded, held by itself.
+fn up() -> Driving {
+    let mut drives = parked();
+    drives.calibrate().unwrap();
+    run(&mut drives, 3.0);
+    drives.unfold().unwrap();
+    run(&mut drives, 6.0);
+    drives
 }

@@ -1,9 +1,11 @@
 //! The field bus: whether the arm answers on it, and who waits for that.
 
 use super::Driver;
+use crate::libraries::youbot::drives::Measured;
 use crate::runtime::Ticket;
 
-/// An arm that was not heard for so long is not there any more: the field bus has failed, in s.
+/// An arm that was not heard for so long is not there any more: the field bus has failed, in s. Drives that are told nothing for so long switch
+/// themselves off (`youbot.World`).
 pub(super) const BUS_TIMEOUT: f64 = 0.02;
 /// An arm that has not been heard at all is waited for so long by who wants it to move, in s.
 const BUS_UP: f64 = 1.0;
@@ -15,6 +17,15 @@ impl Driver {
     pub(super) fn hold(&mut self) {
         if self.arm_is_there {
             self.drives.hold();
+        }
+    }
+
+    /// It comes back after the drives were told nothing for longer than their watchdog waits: they are off, and give no torque. Where they had power
+    /// that is a fault of the bus; the arm is held where it is now, by torques that begin from none.
+    pub(super) fn held_up(&mut self, measured: Measured) {
+        if self.drives.has_power() {
+            self.drives.lose_power(measured);
+            self.fail("ec_timeout");
         }
     }
 
