@@ -3,7 +3,7 @@
 //! What this leaves out is argued step by step below; all the same, whoever uses the result on a live system simulates it
 //! and compares, and falls back to the whole list where they differ.
 
-use crate::model::{ComponentName, MemberRef, Step, Tunable};
+use crate::model::{ComponentName, MemberRef, Step, Transition, Tunable};
 use crate::plan::footprint::Slot;
 use crate::plan::undo::{DraftStep, Script, absolute};
 use crate::plan::{PlannedStep, StepId};
@@ -18,7 +18,19 @@ pub fn reduce<V: View>(
     present: Option<&V>,
     bound: &dyn Fn(MemberRef) -> bool,
 ) -> Vec<DraftStep> {
-    cancel(drop_writes(items, present), bound)
+    cancel(drop_writes(items, present, &|_| false), bound, &|_| false)
+}
+
+/// The same where some components have the same things for themselves (`rivals`), one after the other, and nobody simulates the result: what such
+/// a one holds matters to the others from when it is configured on until it is cleaned up, and so does what its properties say then.
+pub(super) fn reduce_among(
+    items: Vec<DraftStep>,
+    bound: &dyn Fn(MemberRef) -> bool,
+    rivals: &dyn Fn(ComponentName) -> bool,
+) -> Vec<DraftStep> {
+    let items = cancel(drop_writes::<System>(items, None, rivals), bound, rivals);
+    // What was written for a state that nobody is brought to any more.
+    cancel(drop_writes::<System>(items, None, rivals), bound, rivals)
 }
 
 /// Whether a property may be set only in certain run states: also that of a component that is neither now nor at the end
@@ -51,8 +63,13 @@ pub(super) fn shorter(
 }
 
 /// Absolute writes: only the last one to a slot counts, none to a component that is destroyed afterwards, and none of the
-/// value that is there. No precondition depends on what a property or a port holds, so leaving one out harms nothing.
-fn drop_writes<V: View>(items: Vec<DraftStep>, present: Option<&V>) -> Vec<DraftStep> {
+/// value that is there. No precondition depends on what a property or a port holds, so leaving one out harms nothing; but when a
+/// rival is configured, its properties say what it holds.
+fn drop_writes<V: View>(
+    items: Vec<DraftStep>,
+    present: Option<&V>,
+    rivals: &dyn Fn(ComponentName) -> bool,
+) -> Vec<DraftStep> {
     let mut lives: FxHashMap<ComponentName, (u32, bool)> = FxHashMap::default();
     let mut later: FxHashSet<(Slot, u32)> = FxHashSet::default();
     let mut kept: Vec<DraftStep> = Vec::with_capacity(items.len());
@@ -66,6 +83,10 @@ fn drop_writes<V: View>(items: Vec<DraftStep>, present: Option<&V>) -> Vec<Draft
             Step::Destroy { .. } => {
                 let life = lives.entry(component).or_default();
                 *life = (life.0 + 1, true);
+            }
+            Step::State { transition: Transition::Configure, .. } if rivals(component) => {
+                let life = lives.entry(component).or_default();
+                *life = (life.0 + 1, false);
             }
             _ => {
                 if let Some(slot) = absolute(&item.step) {
@@ -122,6 +143,8 @@ enum TrailKey {
     Link(MemberRef, MemberRef),
     /// Steps that an in-port's being driven or not matters to.
     Drive(MemberRef),
+    /// A rival takes what it has for itself, or lets it go.
+    Holds,
 }
 
 struct Trails {
@@ -147,18 +170,26 @@ impl Trails {
 }
 
 /// Pairs that take each other back, where nothing between needs the first.
-fn cancel(items: Vec<DraftStep>, bound: &dyn Fn(MemberRef) -> bool) -> Vec<DraftStep> {
+fn cancel(
+    items: Vec<DraftStep>,
+    bound: &dyn Fn(MemberRef) -> bool,
+    rivals: &dyn Fn(ComponentName) -> bool,
+) -> Vec<DraftStep> {
     let mut t = Trails { trails: FxHashMap::default(), out: Vec::with_capacity(items.len()) };
     for item in items {
         match &item.step {
             Step::State { component, transition } => {
                 let c = *component;
+                let holds = matches!(transition, Transition::Configure | Transition::Cleanup) && rivals(c);
                 if let Some(at) = t.last(TrailKey::Moves(c))
                     && let Some(DraftStep { step: Step::State { transition: before, .. }, .. }) = &t.out[at]
                     && before.inverse() == *transition
                     && !t.since(TrailKey::Needs(c), at)
+                    && !(holds && t.since(TrailKey::Holds, at))
                 {
                     t.out[at] = None;
+                } else if holds {
+                    t.push(item, &[TrailKey::Moves(c), TrailKey::Any(c), TrailKey::Holds]);
                 } else {
                     t.push(item, &[TrailKey::Moves(c), TrailKey::Any(c)]);
                 }

@@ -1,10 +1,10 @@
 //! Keeping each pile of frames within its bound: its oldest become one, which is undone as one (semantics: *The stack*).
 
-use super::net::reduce;
+use super::net::reduce_among;
 use super::share::{self, HandOver};
 use super::{Buried, Frame, FrameId, Inverse, Pile};
 use crate::limits;
-use crate::model::{MemberRef, Step};
+use crate::model::{ComponentName, MemberRef, Step};
 use crate::plan::footprint::{Footprint, Slot, Touch};
 use crate::plan::undo::{DraftStep, absolute, items};
 use crate::system::System;
@@ -269,6 +269,18 @@ fn footprint(lower: &Arc<Footprint>, upper: &Footprint) -> Arc<Footprint> {
     Arc::new(Footprint { touches })
 }
 
+/// Who has something for itself that another one has, too, at another time.
+fn rivals(footprint: &Footprint) -> FxHashSet<ComponentName> {
+    let held = || {
+        footprint.touches.iter().filter_map(|touch| match touch.slot {
+            Slot::Held(component, name) => Some((component, name)),
+            _ => None,
+        })
+    };
+    let rival = |(component, name)| held().any(|(other, of)| of == name && other != component);
+    held().filter(|held| rival(*held)).map(|(component, _)| component).collect()
+}
+
 /// Two neighbours as one frame.
 pub(super) fn squash(lower: &Frame, upper: &Frame) -> Frame {
     let parts = parts(lower, upper);
@@ -287,7 +299,8 @@ pub(super) fn squash(lower: &Frame, upper: &Frame) -> Frame {
             })
             .collect();
         let whole: Vec<DraftStep> = list(upper).into_iter().chain(list(lower)).collect();
-        inverse = reduce::<System>(whole, None, &|property| bound.contains(&property));
+        let rivals = rivals(&footprint);
+        inverse = reduce_among(whole, &|property| bound.contains(&property), &|component| rivals.contains(&component));
         let calls = inverse.iter().filter(|item| matches!(item.step, Step::Operation(_))).count();
         if calls > limits::SQUASHED_CALLS {
             floor = Some(format!(

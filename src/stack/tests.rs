@@ -41,6 +41,11 @@ fn types() -> Arc<Catalogue> {
     let mut catalogue = Catalogue::new();
     catalogue.insert(ty);
     catalogue.insert(bus);
+    let mut line = ComponentType::new("t.Line", "has the line of its number for itself");
+    let number = PropertyType::new(ValueType::Int, Tunable::Unconfigured);
+    line.properties.insert(ident("number"), PropertyType { default: Some(Value::Int(0)), ..number });
+    line.exclusive.push(Resource::parse("line{number}").unwrap());
+    catalogue.insert(line);
     Arc::new(catalogue)
 }
 

@@ -220,3 +220,41 @@ fn what_adds_nothing_shares_what_is_there() {
     let more = &bench.stack.frames()[0];
     assert!(more.footprint.touches.len() > after.footprint.touches.len() && more.parts.len() > after.parts.len());
 }
+
+/// Of two that have the same line for themselves, one after the other, what is taken back in between is not left out.
+#[test]
+fn who_takes_what_another_let_go_is_led_back_first() {
+    let mut bench = Bench::new(2);
+    let with = |number: i64| ChangeKind::PropertySet { property: member("C.number"), value: Value::Int(number) };
+    let other = [("C", Wanted::Unconfigured)];
+    let running = [("C", Wanted::Running)];
+    let (c, d) = (create("C", "t.Line"), create("D", "t.Line"));
+    bench.ok(&[push(&conf("up", None, &[], vec![c, d], &[]))]);
+    bench.ok(&[push(&conf("go", None, &[], vec![with(1)], &[running[0], ("D", Wanted::Running)]))]);
+    bench.stack.make_permanent(Requester::Operator);
+    let before = bench.system.snapshot();
+    let again = conf("again", None, &other, vec![with(2)], &running);
+    let away = conf("away", None, &[], vec![], &[("D", Wanted::Unconfigured)]);
+    let takes = conf("takes", None, &other, vec![with(0)], &running);
+    for configuration in [&again, &away, &takes] {
+        bench.ok(&[push(configuration)]);
+    }
+    for n in 1..4 {
+        bench.ok(&[push(&conf(&format!("c{n}"), None, &[], vec![set("A.gain", f64::from(n))], &[]))]);
+    }
+    assert!(bench.stack.len() == 2 && bench.stack.frames()[0].is_squashed());
+    // Going round leaves no more behind than going once.
+    let longest =
+        |bench: &Bench| bench.stack.frames().iter().map(|frame| super::super::squash::list(frame).len()).max();
+    let once = longest(&bench);
+    for _ in 0..20 {
+        let back = conf("back", None, &other, vec![with(2)], &running);
+        let on = conf("on", None, &[], vec![], &[("D", Wanted::Running)]);
+        for configuration in [&back, &on, &away, &takes] {
+            bench.ok(&[push(configuration)]);
+        }
+    }
+    assert!(longest(&bench) <= once, "{:?} {once:?}", longest(&bench));
+    bench.ok(&[Op::UndoTo(0)]);
+    assert_eq!(bench.system.snapshot(), before);
+}
