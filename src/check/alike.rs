@@ -4,16 +4,20 @@
 //! everything but such values is, and where these are alike wherever they are alike in the other file. What is said of values themselves
 //! (types, limits, what a library reads in them) is no part of that, and is looked at in each.
 
-use crate::model::{Catalogue, ChangeKind, ComponentName, Deployment, Ident, MemberRef, TypeName, Value, ValueType};
+use crate::model::monitor::is_monitors;
+use crate::model::{
+    Catalogue, ChangeKind, ComponentName, Deployment, Ident, MemberRef, OperatorMay, TypeName, Value, ValueType,
+};
 use crate::stack::contenders::may_hold;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Whether two files without subsystems are the same but for values.
 pub fn is_alike(one: &Deployment, other: &Deployment, catalogue: &Catalogue) -> bool {
-    if one.own.is_some() || other.own.is_some() || !holds_alike(one, other, catalogue) {
+    if one.own.is_some() || other.own.is_some() {
         return false;
     }
     let Some(mut pairs) = Pairs::new(one, catalogue) else { return false };
+    pairs.fixed = asked_for(one, other, catalogue);
     let taken = defaults_taken(one, catalogue);
     let mut renamed = other.clone();
     for (configuration, by) in renamed.configurations.iter_mut().zip(&one.configurations) {
@@ -23,8 +27,10 @@ pub fn is_alike(one: &Deployment, other: &Deployment, catalogue: &Catalogue) -> 
                     property == of && pairs.renames(*of, value, by)
                 }
                 (
-                    ChangeKind::Create { component, properties, .. },
-                    ChangeKind::Create { component: of, properties: by, .. },
+                    ChangeKind::Create { component, properties, .. }
+                    | ChangeKind::Replace { component, properties, .. },
+                    ChangeKind::Create { component: of, properties: by, .. }
+                    | ChangeKind::Replace { component: of, properties: by, .. },
                 ) => {
                     let given = properties.iter_mut().zip(by);
                     component == of
@@ -49,6 +55,8 @@ pub fn is_alike(one: &Deployment, other: &Deployment, catalogue: &Catalogue) -> 
 struct Pairs {
     /// What properties take: a whole number may be written for any number.
     types: BTreeMap<MemberRef, ValueType>,
+    /// Whose values are asked for, and have to be the same.
+    fixed: BTreeSet<MemberRef>,
     known: BTreeMap<MemberRef, Vec<(Value, Value)>>,
 }
 
@@ -64,7 +72,7 @@ impl Pairs {
                 }
             }
         }
-        Some(Self { types, known: BTreeMap::new() })
+        Some(Self { types, fixed: BTreeSet::new(), known: BTreeMap::new() })
     }
 
     /// A value of the other file is called as in this one, if that is one to one.
@@ -78,6 +86,9 @@ impl Pairs {
         // What does not fit is refused, and nothing follows.
         let fit = |value: &Value| self.types.get(&property).and_then(|ty| value.clone().fit(ty).ok());
         let (Some(other), Some(one)) = (fit(other), fit(one)) else { return other == one };
+        if self.fixed.contains(&property) {
+            return other == one;
+        }
         let known = self.known.entry(property).or_default();
         match known.iter().find(|(of, by)| *of == other || *by == one) {
             Some((of, by)) => *of == other && *by == one,
@@ -103,14 +114,29 @@ fn defaults_taken(of: &Deployment, catalogue: &Catalogue) -> Vec<(MemberRef, Val
     taken.flatten().collect()
 }
 
-/// Whether what components have for themselves keeps the same ones apart: it is the same, or nobody's twice.
-fn holds_alike(one: &Deployment, other: &Deployment, catalogue: &Catalogue) -> bool {
-    let held = |of: &Deployment| may_hold(of.configurations.iter(), catalogue);
-    let (one, other) = (held(one), held(other));
-    let alone = |of: &BTreeMap<ComponentName, BTreeSet<String>>| {
-        let mut names: Vec<&String> = of.values().flatten().collect();
-        names.sort();
-        names.windows(2).all(|two| two[0] != two[1])
-    };
-    one == other || one.keys().eq(other.keys()) && alone(&one) && alone(&other)
+/// The properties whose values matter: which monitors are enabled, what an operator may set (what another value than these is), and, where
+/// components may get in each other's way by them, what they have for themselves.
+fn asked_for(one: &Deployment, other: &Deployment, catalogue: &Catalogue) -> BTreeSet<MemberRef> {
+    let set = one.operator.iter().filter_map(|(may, _)| match may {
+        OperatorMay::Set(member) => Some(*member),
+        OperatorMay::Apply(_) => None,
+    });
+    let mut asked: BTreeSet<MemberRef> = set.collect();
+    let apart = nothing_is_held_twice(one, catalogue) && nothing_is_held_twice(other, catalogue);
+    for (component, ty, _) in made(one) {
+        let Some(ty) = catalogue.get(ty) else { continue };
+        let resources = ty.exclusive.iter().filter(|_| !apart).flat_map(|resource| resource.properties());
+        asked.extend(resources.map(|name| component.member(name)));
+        let enabled = ty.properties.keys().filter(|_| is_monitors(ty.name));
+        asked.extend(enabled.map(|name| component.member(*name)));
+    }
+    asked
+}
+
+/// Whether no two components of a file can come to have the same thing for themselves.
+fn nothing_is_held_twice(of: &Deployment, catalogue: &Catalogue) -> bool {
+    let held = may_hold(of.configurations.iter(), catalogue);
+    let mut names: Vec<&String> = held.values().flatten().collect();
+    names.sort();
+    names.windows(2).all(|two| two[0] != two[1])
 }

@@ -8,6 +8,7 @@ use super::alike::is_alike;
 use super::automaton::InterfaceAutomaton;
 use super::neighbours::{Neighbours, ParentInterface, accepted};
 use super::report::{Accepted, Explored, Report};
+use super::settings;
 use super::side_by_side;
 use super::simulated;
 use super::trace::{Does, TraceStep};
@@ -34,16 +35,18 @@ where
         return one(whole, catalogue, around);
     }
     let files = Instances::of(&whole, catalogue);
-    let checked = side_by_side::each(&files, |file| {
+    let check = |file: &Instances<'_>, all: &[&Subsystem], stands_for: bool| {
         let local = catalogue.known_in(file.first.name);
-        let parent = Some(ParentInterface::of(whole.own_part(), file.all.iter().copied()));
-        run(
-            file.first.own.clone(),
-            &local,
-            &Neighbours { parent, stands_for: file.stands_for, ..Neighbours::default() },
-            one,
-        )
-    });
+        let parent = Some(ParentInterface::of(whole.own_part(), all.iter().copied()));
+        run(file.first.own.clone(), &local, &Neighbours { parent, stands_for, ..Neighbours::default() }, one)
+    };
+    let mut checked = side_by_side::each(&files, |file| check(file, &file.all, file.like.is_some()));
+    for (at, file) in files.iter().enumerate() {
+        // Of one that is refused for its values nothing was followed.
+        if file.like.is_some_and(|like| checked[like].0.verdict == CheckVerdict::Refused) {
+            checked[at] = check(file, &[file.first], false);
+        }
+    }
     let mut around = Neighbours { parent: around.parent.clone(), ..Neighbours::default() };
     let mut reports: Vec<(Vec<Ident>, Report)> = Vec::new();
     for (file, (report, shows)) in files.into_iter().zip(checked) {
@@ -75,8 +78,8 @@ struct Instances<'s> {
     first: &'s Subsystem,
     /// Of which what is followed here tells: these, and those that differ in values alone.
     all: Vec<&'s Subsystem>,
-    /// What is followed of another one tells of it.
-    stands_for: bool,
+    /// What is followed of these others tells of them.
+    like: Option<usize>,
 }
 
 impl<'s> Instances<'s> {
@@ -91,17 +94,16 @@ impl<'s> Instances<'s> {
         for subsystem in &whole.subsystems {
             let same = |file: &Self| Arc::ptr_eq(&file.first.own, &subsystem.own);
             let local = catalogue.known_in(subsystem.name);
-            let follows =
-                |file: &Self| !file.stands_for && (same(file) || is_alike(&file.first.own, &subsystem.own, &local));
+            let alike =
+                |file: &Self| file.first.file == subsystem.file && is_alike(&file.first.own, &subsystem.own, &local);
             let known = files.iter().any(same);
-            let followed = files.iter_mut().find(|file| follows(file));
-            let stands_for = followed.is_some();
-            if let Some(file) = followed {
-                file.all.push(subsystem);
+            let like = files.iter().position(|file| file.like.is_none() && (same(file) || alike(file)));
+            if let Some(like) = like {
+                files[like].all.push(subsystem);
             }
             if !known {
-                let all = if stands_for { Vec::new() } else { vec![subsystem] };
-                files.push(Self { first: subsystem, all, stands_for });
+                let all = if like.is_some() { Vec::new() } else { vec![subsystem] };
+                files.push(Self { first: subsystem, all, like });
             }
         }
         files
@@ -116,7 +118,7 @@ fn parents_view(own: &Deployment, catalogue: &Catalogue) -> (Deployment, Catalog
         types.insert(ty.clone());
     }
     for subsystem in &own.subsystems {
-        let exported = exported(subsystem, catalogue);
+        let exported = exported(own, subsystem, catalogue);
         let accepted = accepted(subsystem).into_iter().map(|event| (event, subsystem.origin));
         for (event, origin) in accepted {
             let raises = own.charts().any(|chart| chart.raises(event.as_str()));
@@ -143,8 +145,13 @@ fn parents_view(own: &Deployment, catalogue: &Catalogue) -> (Deployment, Catalog
     (view, types)
 }
 
-/// The components that a subsystem exports something of, each with a type that has that and nothing else.
-fn exported(subsystem: &Subsystem, catalogue: &Catalogue) -> BTreeMap<ComponentName, ComponentType> {
+/// The components that a subsystem exports something of, each with a type that has that and nothing else. What the subsystem has given a property
+/// is not known there: another value than any that the parent gives, so that each of these is a step that may fail.
+fn exported(
+    parent: &Deployment,
+    subsystem: &Subsystem,
+    catalogue: &Catalogue,
+) -> BTreeMap<ComponentName, ComponentType> {
     let mut types: BTreeMap<ComponentName, ComponentType> = BTreeMap::new();
     for export in subsystem.own.interface.exports.values() {
         let component = export.of.component.within(subsystem.name);
@@ -160,7 +167,8 @@ fn exported(subsystem: &Subsystem, catalogue: &Catalogue) -> BTreeMap<ComponentN
             MemberClass::Property => {
                 ty.properties.extend(whole.properties.get_key_value(&export.of.member).map(own).map(
                     |(name, mut of)| {
-                        of.default = of.default.clone().or_else(|| Some(some_value(&of.ty)));
+                        of.default = settings::another(parent, component.member(name), &of).or(of.default);
+                        of.default = of.default.or_else(|| Some(some_value(&of.ty)));
                         (name, of)
                     },
                 ));

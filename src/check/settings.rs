@@ -6,7 +6,8 @@
 
 use super::universe::Universe;
 use crate::model::{
-    Change, ChangeKind, ConfigId, Configuration, Deployment, Direction, Ident, MemberRef, OperatorMay, Value, ValueType,
+    Change, ChangeKind, ConfigId, Configuration, Deployment, Direction, Ident, MemberRef, OperatorMay, PropertyType,
+    Value, ValueType,
 };
 use std::borrow::Cow;
 
@@ -49,6 +50,15 @@ fn changes(deployment: &Deployment, universe: &Universe, member: MemberRef) -> V
         }
     }
     changes
+}
+
+/// A value of a property that no configuration gives it; none: there is no such one.
+pub fn another(deployment: &Deployment, property: MemberRef, declared: &PropertyType) -> Option<Value> {
+    let given = given(deployment, property);
+    let values = values(&declared.ty, (declared.min, declared.max), &given, &|value| declared.fit(value).ok());
+    values
+        .into_iter()
+        .find(|value| !given.iter().any(|given| declared.fit((*given).clone()).ok().as_ref() == Some(value)))
 }
 
 /// The values that configurations give a member.

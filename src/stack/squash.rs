@@ -7,7 +7,6 @@ use crate::limits;
 use crate::model::{ComponentName, MemberRef, Step};
 use crate::plan::footprint::{Footprint, Slot, Touch};
 use crate::plan::undo::{DraftStep, absolute, items};
-use crate::system::System;
 use rustc_hash::{FxBuildHasher, FxHashMap, FxHashSet};
 use smallvec::SmallVec;
 use std::collections::BTreeSet;

@@ -122,3 +122,130 @@ fn what_follows_from_one_follows_from_what_is_alike() {
     // Were two taken for alike whose values are not, that would be seen.
     assert!(alike > 5 && follows > 10, "{alike} alike; of {differ} others {follows} lead to something else");
 }
+
+/// A file with these types, configurations and further keys, of which two come up one after the other.
+fn file(types: &str, configurations: &str, more: &str) -> Deployment {
+    let deployment = format!(
+        "davit: 1\nname: file\nplatform: simulated\nlibraries: [standard]\ntypes: {{ {types} }}\nconfigurations: [conf.lua]\n\
+         coordinator: coordinator.lua\ndeploy: {{ event: e_start, up: on, within_s: 5 }}\n\
+         shutdown: {{ event: e_shutdown, down: idle, within_s: 5 }}\n{more}"
+    );
+    let coordinator = "return state {
+  idle = state {}, making = state { entry = 'make' }, on = state { entry = 'one' }, off = state { entry = { 'one.undo', 'make.undo' } },
+  trans { src = 'initial', tgt = 'idle' }, trans { src = 'idle', tgt = 'making', events = { 'e_start' } },
+  trans { src = 'making', tgt = 'on', events = { 'make.ok' } }, trans { src = 'on', tgt = 'off', events = { 'e_shutdown' } },
+  trans { src = 'off', tgt = 'idle', events = { 'make.undone' } },
+}";
+    let sources = Sources::memory([
+        ("file.yaml", deployment),
+        ("conf.lua", format!("ConfiguratorConf {{ {configurations} }}")),
+        ("coordinator.lua", coordinator.to_owned()),
+        ("monitors.lua", "Monitors { low = monitor { when = below('S.y', 5.0), event = 'e_low' } }".to_owned()),
+    ]);
+    let loaded = load(&sources, "file.yaml", &[]);
+    loaded.deployment.unwrap_or_else(|| panic!("{:#?}", loaded.findings))
+}
+
+fn alike(types: &str, configurations: [&str; 2], more: &str) -> bool {
+    let [one, other] = configurations.map(|configurations| file(types, configurations, more));
+    is_alike(&one, &other, &catalogue(&one))
+}
+
+#[test]
+fn things_that_are_there_once_are_told_apart_by_their_names() {
+    let types = "T: { exclusive: ['bus:{b}'], properties: { b: { type: string, tunable: unconfigured } } }";
+    let with = |values: [&str; 4]| {
+        let [a, b, c, d] = values;
+        format!(
+            "make = Configuration {{ create('A', 'T', {{ properties = {{ b = '{a}' }} }}), create('B', 'T', {{ properties = {{ b = '{b}' }} }}) }},
+             one = Configuration {{ property_set('A.b', '{c}'), property_set('B.b', '{d}'), post_conf_state = {{ 'A:stopped', 'B:stopped' }} }}"
+        )
+    };
+    // Both may hold both in both files, and in one of them at once.
+    let [apart, clash] = [["x", "y", "y", "x"], ["y", "y", "x", "x"]].map(with);
+    assert!(!alike(types, [&apart, &clash], "") && !alike(types, [&clash, &apart], ""));
+    let [one, other] = [["x", "y", "u", "v"], ["1", "2", "3", "4"]].map(with);
+    assert!(alike(types, [&one, &other], ""), "nobody's twice");
+}
+
+#[test]
+fn what_a_component_is_replaced_with_counts() {
+    let types = "T: { properties: { k: { type: float, default: 1.0 } } }";
+    let with = |k: &str| {
+        format!(
+            "make = Configuration {{ create('A', 'T', {{ properties = {{ k = 9.0 }} }}) }}, one = Configuration {{ property_set('A.k', {k}) }},
+             again = Configuration {{ replace('A', 'T', {{ properties = {{ k = 2.0 }} }}) }}"
+        )
+    };
+    let [same, other, third] = ["2.0", "3.0", "4.0"].map(with);
+    assert!(!alike(types, [&same, &other], "") && !alike(types, [&other, &same], ""));
+    assert!(alike(types, [&other, &third], ""));
+}
+
+#[test]
+fn values_that_are_asked_for_are_the_same_in_what_is_alike() {
+    let enabled = |low: bool| {
+        format!(
+            "make = Configuration {{ create('S', 'standard.Sine'), create('M', 'davit.Monitors', {{ properties = {{ low = {low} }} }}) }},
+             one = Configuration {{}}"
+        )
+    };
+    let monitors = "monitors: [monitors.lua]\n";
+    assert!(alike("", [&enabled(true), &enabled(true)], monitors));
+    assert!(!alike("", [&enabled(true), &enabled(false)], monitors), "a monitor that watches, and one that does not");
+    let types = "T: { properties: { k: { type: bool, default: false } } }";
+    let given = |k: bool| {
+        format!(
+            "make = Configuration {{ create('A', 'T', {{ properties = {{ k = {k} }} }}) }}, one = Configuration {{}}"
+        )
+    };
+    assert!(alike(types, [&given(true), &given(false)], ""));
+    assert!(!alike(types, [&given(true), &given(false)], "operator: [A.k]\n"), "the other one is the operator's");
+}
+
+#[test]
+fn who_is_refused_for_its_values_stands_for_nobody() {
+    let narrow = ("arm.yaml", "k: { type: float, default: 1.0 }", "k: { type: float, default: 1.0, min: 0.3 }");
+    let waits = ("arm.lua", "tgt = 'idle', events = { 'make.undone' }", "tgt = 'idle', events = { 'make.gone' }");
+    let told = |left: &str| {
+        let text = format!("left: {{ deployment: arm.yaml, parameters: {{ gain: {left} }} }}");
+        let files =
+            files(&[narrow, waits, ("pair.yaml", "left: { deployment: arm.yaml, parameters: { gain: 0.7 } }", &text)]);
+        let whole = load(&files, "pair.yaml", &[]).deployment.unwrap();
+        check::run(whole.clone(), &catalogue(&whole)).findings
+    };
+    let of_right = |left: &str| {
+        let mut codes: Vec<_> = told(left)
+            .into_iter()
+            .filter(|finding| finding.origin.is_some() && finding.code.0.starts_with("coord::"))
+            .map(|finding| (finding.code, finding.severity))
+            .collect();
+        codes.sort();
+        codes.dedup();
+        codes
+    };
+    assert!(of_right("0.7").iter().any(|(_, severity)| *severity >= Severity::Warning));
+    for code in of_right("0.7") {
+        assert!(of_right("0.2").contains(&code), "{code:?}: {:?}", of_right("0.2"));
+    }
+}
+
+#[test]
+fn what_a_parent_sets_is_a_step_whatever_the_type_says() {
+    let unheard = |value: &str| {
+        let stiff = format!("stiff = Configuration {{ property_set('left.k', {value}) }}");
+        let changes = [
+            ("pair_conf.lua", "stiff = Configuration { property_set('left.k', 2.0) }", &*stiff),
+            ("pair.lua", "coupled = state {}", "coupled = state { entry = 'stiff' }"),
+            (
+                "pair.lua",
+                "parting = state { entry = 'couple.undo' }",
+                "parting = state { entry = { 'stiff.undo', 'couple.undo' } }",
+            ),
+        ];
+        let whole = load(&files(&changes), "pair.yaml", &[]).deployment.unwrap();
+        check::run(whole.clone(), &catalogue(&whole)).explored
+    };
+    // 1.0 is what the type has by itself; the subsystem has set another one.
+    assert_eq!(unheard("1.0"), unheard("2.0"));
+}
