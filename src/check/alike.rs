@@ -2,7 +2,7 @@
 //!
 //! What is followed asks of a property's value only whether it is the one that was there before. So two files are the same for it where
 //! everything but such values is, and where these are alike wherever they are alike in the other file. What is said of values themselves
-//! (types, limits, what a library reads in them) is no part of that, and is looked at in each.
+//! (types, limits, what a library reads in them) is no part of that, and is looked at in each; where a value itself is asked for, it is the same in both.
 
 use crate::model::monitor::is_monitors;
 use crate::model::{
