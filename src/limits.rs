@@ -292,6 +292,10 @@ pub const CONFIGURATOR_CONTROL: usize = 256;
 /// Blocking platform calls made at the same time at most, whatever the deployment says: each takes a thread.
 pub const WORKERS_MOST: usize = 64;
 
+/// Panics of the configurator's thread, one after the other without its ever having nothing to do, after which what was under way
+/// and what waits is given up.
+pub const PANICS_IN_A_ROW: usize = 8;
+
 /// Steps handed to a platform in one call: the way there and back is then a small part of them.
 pub const BATCH_STEPS: usize = 256;
 

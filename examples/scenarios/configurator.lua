@@ -1,7 +1,7 @@
 -- The configurator's own end, in the middle of a switch:  davit run examples/scenarios/configurator.lua --clock simulated
 --
 -- Its thread panics while a call of the left robot is under way. What was asked for is answered *broken*, and the thread begins anew with what the
--- platform shows. The robot whose switch it was is stopped; the other one lets go of it and goes on.
+-- platform shows. The robot whose switch it was is stopped; the other one lets go of it and goes on. Then the same while both arms unfold.
 
 deploy("../../deployments/youbot_coupling.yaml")
 wait_state("left:copying", 20)
@@ -37,3 +37,22 @@ raise("left/e_reset")
 wait_state("left:operational", 1)
 wait_state("left:copying", 20)
 wait_state("right:copying", 20)
+
+-- While both arms unfold: the calls are given up, and what they had begun is folded on the way down, before the drives go off.
+raise("e_shutdown")
+wait_state("pair:idle", 20)
+raise("e_start")
+wait_state("left:unfolding", 5)
+wait(2.5)
+at = now()
+inject("configurator", "panic")
+wait_answer("left/unfold.broken", 0.5)
+expect{ name = "while it unfolds: answered after", value = 1000 * (now() - at), max = 100, unit = "ms" }
+wait(1)
+s = sample{ every = 0.001, signals = { fast = "World.robot1_tool_twist.v[2]" } }
+raise("e_shutdown")
+wait_answer("left/unfold.undone", 6)
+s:stop()
+expect{ name = "on the way down the tool sinks with", value = -s:min("fast"), max = 0.3, unit = "m/s" }
+wait_state("pair:idle", 5)
+expect{ name = "frames left", value = #stack(), max = 0 }

@@ -25,6 +25,7 @@ impl Engine {
         // Taken out, so that what it does may touch everything else; a panic on the way must not lose it.
         let before = self.steps;
         let went = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| self.go_on(&mut running)));
+        running.panics += u8::from(went.is_err() && running.panics < u8::MAX);
         self.running.insert(at, running);
         match went {
             Ok(did) => did || self.steps != before,
@@ -225,9 +226,11 @@ impl Engine {
                     running.machine.on(Input::NotBegun(step), &mut self.world.system);
                     continue;
                 }
-                self.tell(running, step, StepEnd::from(&outcome), Some(took));
+                // Booked before anybody hears of it: whoever listens may panic.
+                let end = StepEnd::from(&outcome);
                 running.machine.on(Input::Ended { step, outcome }, &mut self.world.system);
                 self.steps += 1;
+                self.tell(running, step, end, Some(took));
             }
             for step in not_begun {
                 running.machine.on(Input::NotBegun(step), &mut self.world.system);

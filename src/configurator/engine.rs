@@ -20,6 +20,7 @@ use crate::stack::{Arrived, Batch, Desk, FrameId, LedDown, Requester, Why, World
 use crate::time::{Clock, Receiver, RecvError, Time};
 use rustc_hash::{FxHashMap, FxHashSet};
 use smallvec::SmallVec;
+use std::any::Any;
 use std::collections::{BTreeSet, VecDeque};
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;
@@ -98,6 +99,10 @@ pub(super) struct Engine {
     pub leaving_inside: (usize, SmallVec<[Ident; 2]>),
     /// What takes its time has been broken off, since force is wanted.
     pub hurried: bool,
+    /// Panics since there was last nothing to be done.
+    pub panics: usize,
+    /// A listener has panicked when it was told an answer.
+    pub listener: Option<Box<dyn Any + Send>>,
 }
 
 impl Engine {
@@ -131,6 +136,8 @@ impl Engine {
             leaving: None,
             leaving_inside: (0, SmallVec::new()),
             hurried: false,
+            panics: 0,
+            listener: None,
         }
     }
 
@@ -138,15 +145,7 @@ impl Engine {
     pub fn live(mut self) {
         while !self.stopping {
             if let Err(payload) = catch_unwind(AssertUnwindSafe(|| self.work())) {
-                let text = crate::time::clock::panic_text(&*payload);
-                // A panic while starting anew must not end the thread either: then there is no picture to be had, and who asked is
-                // told so.
-                if catch_unwind(AssertUnwindSafe(|| self.start_anew(&text))).is_err() {
-                    self.running.clear();
-                    self.desk.under_way().to_vec().iter().for_each(|active| self.desk.over(active.number));
-                    let _ = catch_unwind(AssertUnwindSafe(|| self.break_current(&Reason::Panic(text))));
-                    self.current.clear();
-                }
+                self.survive(&crate::time::clock::panic_text(&*payload));
             }
         }
         self.bid_farewell();
@@ -154,6 +153,9 @@ impl Engine {
 
     fn work(&mut self) {
         while !self.stopping {
+            if let Some(payload) = self.listener.take() {
+                resume_unwind(payload);
+            }
             if let Some(command) = self.commands.pop_front() {
                 self.counts.command_taken(command.only_asks());
                 self.in_turn(command);
@@ -187,6 +189,7 @@ impl Engine {
             if self.observe_slowly() {
                 continue;
             }
+            self.panics = 0;
             let confirm = self.confirmations.until();
             let looks = self.suspects.until().unwrap_or(Time::NEVER);
             let (observed, idle) = self.observing.until();
@@ -401,13 +404,16 @@ impl Engine {
 
     pub fn owe_since(&mut self, request: Request, begun: Time) {
         if request.why == Why::Asked {
-            let safe =
-                matches!(request.ask, Ask::Apply(id) if self.given.configurations.get(&id).is_some_and(|c| c.safe));
-            let count = if safe { &self.counts.safe } else { &self.counts.requests };
+            let count = if self.is_safe(&request) { &self.counts.safe } else { &self.counts.requests };
             count.fetch_sub(1, Ordering::AcqRel);
             self.down.remove(&request.requester);
         }
         self.current.push((request, begun));
+    }
+
+    /// Whether that asks for a safe configuration.
+    pub fn is_safe(&self, request: &Request) -> bool {
+        matches!(request.ask, Ask::Apply(id) if self.given.configurations.get(&id).is_some_and(|c| c.safe))
     }
 
     /// Answers a request that has begun.
@@ -436,8 +442,11 @@ impl Engine {
         let took = at.since(begun);
         let answer = Answer { request, verdict, at, took, reason };
         self.changed();
-        if let Some(progress) = &self.given.progress {
-            progress(&Progress::Answered(answer.clone()));
+        // Who asked is told, whatever becomes of those who only listen, and so is who else is answered now.
+        if let Some(progress) = &self.given.progress
+            && let Err(payload) = catch_unwind(AssertUnwindSafe(|| progress(&Progress::Answered(answer.clone()))))
+        {
+            self.listener = Some(payload);
         }
         (self.given.answers)(answer);
     }
@@ -475,15 +484,6 @@ impl Engine {
         let told = |frame: &FrameId| self.world.broken.iter().any(|broken| broken.frame == Some(*frame));
         let left = self.partials.iter().filter(|(frame, _)| !told(frame));
         left.map(|(_, residual)| residual.of_partial(&self.world.system)).collect()
-    }
-
-    /// What has begun and was not answered is answered: nobody knows how far it came.
-    fn break_current(&mut self, reason: &Reason) {
-        while let Some((request, begun)) = self.current.pop() {
-            if request.why == Why::Asked {
-                self.tell_answer(request, request.ask.broken(), Some(Arc::new(reason.clone())), begun);
-            }
-        }
     }
 
     /// Everything that still waits is answered.

@@ -16,7 +16,7 @@ use crate::stack::{Batch, Group, HandOver, Planned, ResolvedStep, Switch, Why, W
 use crate::time::Time;
 use crate::transaction::Transaction;
 use smallvec::SmallVec;
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
 impl Engine {
     /// Keeps what was planned for a fixed configuration.
@@ -97,11 +97,21 @@ impl Engine {
         if number.is_none() {
             self.owe_since(request, begun);
         }
-        let mut at = begun;
-        if let Err((sent, outcome)) = self.switch_over(&mut fast, request, undoing, &mut at) {
+        let (mut at, mut sent) = (begun, 0);
+        let went = catch_unwind(AssertUnwindSafe(|| self.switch_over(&mut fast, request, undoing, &mut at, &mut sent)));
+        if !matches!(went, Ok(Ok(()))) {
+            // Who listens has panicked, or the model: what was done is not lost with that.
+            let (outcome, payload) = match went {
+                Ok(ended) => (ended.err(), None),
+                Err(payload) => (None, Some(payload)),
+            };
+            let outcome = outcome.unwrap_or_else(|| Outcome::Unknown(Cause::Lost("a panic".to_owned())));
             let number = number.or_else(|| self.takes_place(request));
             self.go_on_from(number.expect("the desk is empty"), &fast.switch, request, undoing, (sent, outcome));
             self.switches.entry(id).or_default().push(fast);
+            if let Some(payload) = payload {
+                resume_unwind(payload);
+            }
             return Fared::GoesOn;
         }
         if undoing {
@@ -132,18 +142,18 @@ impl Engine {
     }
 
     /// Carries out the steps, from `at` on, which becomes the time of the last look at the clock: a look costs as much as a
-    /// step, so only those that may take time are measured. The error is the number of the step that was not done, and what
-    /// came of it.
+    /// step, so only those that may take time are measured. `sent` becomes how many were done; the error is what came of the
+    /// next.
     fn switch_over(
         &mut self,
         fast: &mut Fast,
         request: Request,
         undoing: bool,
         at: &mut Time,
-    ) -> Result<(), (u32, Outcome)> {
+        sent: &mut u32,
+    ) -> Result<(), Outcome> {
         let deadline = *at + self.given.limits.step_timeout;
-        let mut sent = 0u32;
-        while let Some(ResolvedStep { step, place, index, value }) = fast.switch.step(sent as usize, undoing) {
+        while let Some(ResolvedStep { step, place, index, value }) = fast.switch.step(*sent as usize, undoing) {
             let name = StepName::of(step);
             if let Some(progress) = &self.given.progress {
                 progress(&Progress::Started(name));
@@ -170,10 +180,10 @@ impl Engine {
                 progress(&Progress::Ended { request: request.id, step: name, end, took, undoing });
             }
             if !matches!(outcome, Outcome::Done(_)) {
-                return Err((sent, outcome));
+                return Err(outcome);
             }
             place.effect(step, &mut self.world.system);
-            sent += 1;
+            *sent += 1;
         }
         self.changed();
         Ok(())

@@ -34,6 +34,13 @@ impl Observing {
         }
     }
 
+    /// A round begins now, whatever was looked at.
+    pub fn at_once(&mut self, now: Time) {
+        self.rest.clear();
+        self.owed = true;
+        self.next = Some(now);
+    }
+
     /// A round is over, or begins to be waited for.
     pub fn later(&mut self, now: Time) {
         self.rest.clear();

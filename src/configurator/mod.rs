@@ -13,10 +13,12 @@
 //! * `engine`: the thread. `requests`: batches begin and end. `running`: a transaction under way. `carry`: it and the
 //!   platform; `hands`: an immediate step. [`conditions`], `stands`: what only the values of components tell, and what is
 //!   watched while it is in force. `safe`, `safety`: what goes first. `fast`, `switches`: plans that are carried out again.
-//!   `taking_back`, `teardown`: the second and the third stage of stopping, to nothing. `recovery`: the way out of what is broken. `suspects`, `reported`: who was reported faulted. `confirmations`: frames that
+//!   `taking_back`, `teardown`: the second and the third stage of stopping, to nothing. `recovery`: the way out of what is broken.
+//!   `anew`: after a panic. `suspects`, `reported`: who was reported faulted. `confirmations`: frames that
 //!   wait to be confirmed. `observing`, `looks`: the slow look at what nothing is under way with.
 //!   `pool`, `inbox`: their tools.
 
+mod anew;
 mod carry;
 pub mod conditions;
 mod confirmations;

@@ -9,8 +9,8 @@ use super::repair::By;
 use super::request::{Reason, Request};
 use crate::limits;
 use crate::model::{ComponentName, RequestId, RunState, Snapshot};
-use crate::stack::{Broken, Frame, Op, Planned, Residual, transaction};
-use crate::system::{self, System, View as _, step};
+use crate::stack::{Frame, Op, Planned, Residual, transaction};
+use crate::system::{self, System, View as _};
 use crate::time::Time;
 use crate::transaction::{PartEnd, Transaction};
 use std::sync::Arc;
@@ -202,56 +202,6 @@ impl Engine {
                 Err(residual)
             }
             Some(PartEnd::Cancelled | PartEnd::Anew) => Err(Arc::new(Residual::of(Reason::Busy))),
-        }
-    }
-
-    /// After a panic: what is owed is answered *broken*, and the picture is read back from the platform.
-    pub(super) fn start_anew(&mut self, text: &str) {
-        if let Some(progress) = &self.given.progress {
-            progress(&Progress::Survived(text.to_owned()));
-        }
-        let reason = Reason::Panic(text.to_owned());
-        let mut expected = self.world.system.clone();
-        let running: Vec<_> = self.running.drain(..).collect();
-        for running in running {
-            let asked = running.asked.iter().map(|asked| asked.number);
-            self.forget_conditions(asked.chain(running.stood.iter().map(|(_, number)| *number)));
-            let done: Vec<_> = running.machine.done_so_far().map(|(_, undo)| undo.clone()).collect();
-            for back in done.iter().rev().flat_map(|undo| undo.steps()) {
-                let _ = step::apply(back, &mut expected);
-            }
-        }
-        for active in self.desk.under_way().to_vec() {
-            self.desk.over(active.number);
-        }
-        // It may have been taking everything down: what comes from now on begins again.
-        self.taking_down = false;
-        let seen = self.look();
-        let observed = seen.is_some_and(|seen| self.adopt(&seen).is_ok());
-        let residual =
-            Residual { difference: system::diff(&expected, &self.world.system), observed, ..Residual::of(reason) };
-        let components = residual.components().collect();
-        let residual = Arc::new(residual);
-        let culprit = self.current.iter().find_map(|(request, _)| match request.ask {
-            crate::model::Ask::Apply(id) => Some((id, request.requester)),
-            _ => None,
-        });
-        if !residual.is_settled() {
-            let expected = expected.snapshot();
-            let residual = residual.clone();
-            self.world.breaks(Broken {
-                residual,
-                components,
-                culprit,
-                frame: None,
-                mendable: true,
-                expected,
-                seen: None,
-            });
-        }
-        while let Some((request, begun)) = self.current.pop() {
-            let reason = Arc::new(Reason::Broken(residual.clone()));
-            self.tell_answer(request, request.ask.broken(), Some(reason), begun);
         }
     }
 }

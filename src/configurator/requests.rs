@@ -191,6 +191,7 @@ impl Engine {
             Purpose::Safe(safe) => {
                 self.safe_ended(own, *safe, machine, stood.first().map(|(_, number)| *number));
             }
+            Purpose::Abandoned => self.abandoned(machine, since),
             Purpose::Own => {}
         }
     }

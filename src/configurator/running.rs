@@ -56,6 +56,8 @@ pub(super) enum Purpose {
     Safe(Box<(Request, Frame, Touched)>),
     /// Something of the configurator's own, waited for by whoever began it.
     Own,
+    /// The same, and a panic has taken who waited for it.
+    Abandoned,
 }
 
 /// A transaction under way.
@@ -78,6 +80,8 @@ pub(super) struct Running {
     /// Quarantine does not keep its steps out.
     pub enters_quarantine: bool,
     pub over: bool,
+    /// Panics that came in the middle of it.
+    pub panics: u8,
 }
 
 impl Running {
@@ -101,6 +105,7 @@ impl Running {
             after: SmallVec::new(),
             since,
             over: false,
+            panics: 0,
         }
     }
 

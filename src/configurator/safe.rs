@@ -110,7 +110,7 @@ impl Engine {
     fn is_reached(&self, id: ConfigId, running: &Running) -> bool {
         let requests = match &running.purpose {
             Purpose::Requests(number, _) => self.desk.active(*number).map(|active| &active.batch.requests),
-            Purpose::Safe(_) | Purpose::Own => None,
+            Purpose::Safe(_) | Purpose::Own | Purpose::Abandoned => None,
         };
         requests.is_none_or(|requests| self.given.claims.interrupts(id, requests))
     }
@@ -151,6 +151,8 @@ impl Engine {
     ) {
         let (request, frame, mut touched) = safe;
         machine.note_done(&mut touched);
+        // Also if it comes no further: what was interrupted heeds it. Calls are kept by its frame alone.
+        self.safety.touched.join(touched.without_calls());
         let missed: Vec<Step> = machine.missed().cloned().collect();
         let edits = machine.planned().parts[0].edits.clone();
         let end = machine.end();
@@ -210,7 +212,7 @@ impl Engine {
     }
 
     /// What was interrupted goes back, once no safe configuration is being applied any more.
-    fn release(&mut self, touched: Touched) {
+    pub(super) fn release(&mut self, touched: Touched) {
         self.safety.touched.join(touched);
         if self.running.iter().any(|running| running.is_safe() && !running.over) {
             return;

@@ -134,6 +134,7 @@ impl Transaction {
         let first = forward.failures.iter().find(|(i, _)| self.part_of(*i) == part).or(forward.failures.first());
         match (first, forward.unsettled.first(), &self.stopped_by) {
             (_, _, Some(reason @ Reason::Interrupted(_))) => reason.clone(),
+            (_, _, Some(reason)) if self.broken_off => reason.clone(),
             (_, _, Some(reason @ Reason::GivenUp)) if self.given_up.contains(&part) => reason.clone(),
             (Some((_, reason)), ..) => reason.clone(),
             (None, Some(i), _) => Reason::Step { step: forward.list[*i as usize].step.clone(), cause: Cause::Timeout },
@@ -225,12 +226,11 @@ impl Transaction {
         self.perhaps = self.perhaps_done().into_iter().filter(open).collect();
     }
 
-    /// Everything is being taken down: nobody is asked, and the model is what is known.
-    pub(super) fn compare_blind(&mut self, live: &mut System) {
+    /// Nobody is asked, and the model is what is known; `observed`: nothing else can be.
+    pub(super) fn compare_blind(&mut self, part: usize, observed: bool, live: &System) {
         let nothing = |_: &Step| crate::model::Execution::Blocking;
         let can = Can { execution: &nothing, batches: &|_| false, room: false, quarantined: &[], busy: &[] };
-        let wanted = live.clone();
-        self.judge(0, &wanted, false, true, live, &can);
+        self.judge(part, live, false, observed, live, &can);
     }
 
     /// Names the end. `whole`: `wanted` has nothing of what was done.
@@ -313,6 +313,12 @@ impl Transaction {
                 } else {
                     PartEnd::Done
                 }
+            } else if self.broken_off {
+                match at == blamed && !clean {
+                    true => self.broken(at, residual.clone(), wanted.snapshot_some(&own), whole, live),
+                    false if left.contains(&at) => self.broken(at, own_left(at), Snapshot::default(), whole, live),
+                    false => self.broken_whole(residual.observed),
+                }
             } else if !clean && self.interrupted {
                 match at == blamed {
                     true => self.broken(at, residual.clone(), wanted.snapshot_some(&own), whole, live),
@@ -340,6 +346,13 @@ impl Transaction {
             true => PartEnd::Cancelled,
             false => PartEnd::Failed(self.reason()),
         }
+    }
+
+    /// The end of a part of which nothing is left, but which was broken off: nobody vouches for it.
+    fn broken_whole(&self, observed: bool) -> PartEnd {
+        let residual = Arc::new(Residual { observed, ..Residual::of(self.reason()) });
+        let (expected, gone) = (Snapshot::default(), Edits::default());
+        PartEnd::Broken(Box::new(BrokenPart { residual, frame: None, instead: None, expected, gone, also: Vec::new() }))
     }
 
     /// Parts before `part` that do not stand: a call of theirs was neither done nor finished, or what they lead to is not

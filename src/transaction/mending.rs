@@ -57,7 +57,7 @@ impl Transaction {
     /// Whether a difference may be mended by itself.
     pub(super) fn mends(&self, part: usize) -> bool {
         let held = self.planned.parts.get(part).is_some_and(|part| part.on_failure == OnFailure::Hold);
-        (!held || self.asked_back) && self.withheld.is_none() && !self.taken_down
+        (!held || self.asked_back) && self.withheld.is_none() && !self.taken_down && !self.broken_off
     }
 
     /// Compares what was seen of its components with what should be; mends the difference once; names what remains.

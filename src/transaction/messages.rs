@@ -2,6 +2,7 @@
 
 use super::touched::Touched;
 use crate::model::{ComponentName, ConfigId, Execution, Outcome, Snapshot, Step};
+use crate::stack::Reason;
 use smallvec::SmallVec;
 
 /// What whoever drives it can do now.
@@ -107,4 +108,6 @@ pub enum Input {
     TakenDown,
     /// Nothing further begins, and what was done is taken back as after a failure.
     Stop,
+    /// Whoever carries it out has failed: nothing further begins, nothing is taken back, and it ends *broken*.
+    BreakOff(Reason),
 }

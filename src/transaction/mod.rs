@@ -8,8 +8,7 @@
 //! `run`: a list of steps being carried out; `immediate`: without a detour. `order`: which may begin. `settle`: unknown
 //! outcomes. `stand`: whether what was applied stands. `back`: the way back; `touched`, `heed`: what it leaves to safe
 //! configurations; `bring`: where it goes on for them. `mending`: what is found different. `end`: what comes of each part;
-//! `endings`: what may. `messages`: what
-//! goes in and out.
+//! `endings`: what may. `messages`: what goes in and out; `hears`: what each of them does.
 //!
 //! *What is absent*: no step whose precondition was not looked at on the live model immediately before; no unknown outcome
 //! that is taken for done or not done without having been read back; no step back that moves and that nobody asked for.
@@ -18,6 +17,7 @@ mod back;
 mod bring;
 mod end;
 mod endings;
+mod hears;
 mod heed;
 mod immediate;
 mod limits;
@@ -114,6 +114,7 @@ pub struct Transaction {
     interrupted: bool,
     held: bool,
     taken_down: bool,
+    broken_off: bool,
     reading: bool,
     seen: Option<Option<Snapshot>>,
     /// What was asked and not used yet, with the answers that came.
@@ -161,6 +162,7 @@ impl Transaction {
             interrupted: false,
             held: false,
             taken_down: false,
+            broken_off: false,
             reading: false,
             seen: None,
             asked: Vec::new(),
@@ -250,78 +252,6 @@ impl Transaction {
         self.end.take().expect("it is over")
     }
 
-    /// A step that was begun is back: [`Input::Ended`].
-    pub fn ended(&mut self, step: u32, outcome: Outcome, live: &mut System) {
-        self.doubted |= matches!(outcome, Outcome::Unknown(_));
-        self.in_hand_mut().ended(step, outcome, live);
-    }
-
-    /// What happened.
-    pub fn on(&mut self, input: Input, live: &mut System) {
-        match input {
-            Input::Ended { step, outcome } => self.ended(step, outcome, live),
-            Input::NotBegun(step) => self.in_hand_mut().not_begun(step),
-            Input::Seen(seen) => self.seen = Some(seen),
-            Input::Told { question, is } => {
-                // What is no longer asked is no news.
-                if let Some(asked) = self.asked.iter_mut().find(|asked| asked.question == question) {
-                    asked.told = Some(is);
-                }
-            }
-            Input::GiveUp { part } => {
-                // Once it is on its way back, that goes on.
-                if matches!(self.phase, TransactionPhase::Forward | TransactionPhase::Standing) {
-                    self.stopped_by.get_or_insert(Reason::GivenUp);
-                    self.given_up.push(part);
-                    // What a safe configuration has interrupted moves for no undo of the same request.
-                    self.asked_back |= !self.interrupted;
-                    self.cancel();
-                }
-            }
-            Input::Interrupt(by) => {
-                self.stopped_by = Some(Reason::Interrupted(by));
-                self.interrupted = true;
-                self.asked_back = false;
-                self.held = true;
-                self.cancel();
-                self.in_hand_mut().late_from_now = true;
-                // Wholly: also what stood before the failure, and was being finished; and what is mended is looked at anew.
-                let looks = matches!(
-                    self.phase,
-                    TransactionPhase::Looking | TransactionPhase::Mending | TransactionPhase::LookingAgain
-                );
-                if self.between.take().is_some() || looks {
-                    self.mending.interrupt();
-                    self.phase = TransactionPhase::Stopping;
-                }
-            }
-            Input::Release(touched) => self.release(touched),
-            Input::Stop => {
-                if matches!(self.phase, TransactionPhase::Forward | TransactionPhase::Standing) {
-                    self.stopped_by.get_or_insert(Reason::TakenDown);
-                    self.cancel();
-                }
-            }
-            Input::TakenDown => {
-                self.stopped_by.get_or_insert(Reason::TakenDown);
-                self.taken_down = true;
-                self.held = false;
-                self.cancel();
-            }
-        }
-    }
-
-    /// Calls that are out are told that they are given up.
-    fn cancel(&mut self) {
-        let run = self.in_hand();
-        let calls = run.outstanding().filter(|i| matches!(run.list[*i as usize].step, Step::Operation(_)));
-        let calls: Vec<u32> = calls.collect();
-        if self.back.is_none() {
-            self.told.extend_from_slice(&calls);
-        }
-        self.cancels.extend(calls);
-    }
-
     /// What is to be done next.
     pub fn poll(&mut self, live: &mut System, now: Time, can: &Can<'_>) -> Poll {
         loop {
@@ -397,7 +327,7 @@ impl Transaction {
             TransactionPhase::Forward | TransactionPhase::Reviewing | TransactionPhase::Standing => {
                 self.stopped_by.is_some()
             }
-            _ => self.held || self.taken_down,
+            _ => self.held || self.taken_down || self.broken_off,
         }
     }
 
@@ -458,6 +388,10 @@ impl Transaction {
             Some(_) => self.mending.broke_off = true,
             None => {}
         }
+        if self.broken_off && !self.taken_down {
+            self.phase = TransactionPhase::Looking;
+            return;
+        }
         if self.between.is_none() && part > 0 {
             self.between = Some(Box::new(self.led_to(part, live)));
             self.origin = Some(Box::new(self.before_all(live)));
@@ -472,7 +406,7 @@ impl Transaction {
         let again = self.interrupted || self.attempts < 2;
         if way.list.is_empty() || !(failed && again) || self.attempts > 8 {
             if self.taken_down {
-                self.compare_blind(live);
+                self.compare_blind(0, true, live);
             } else {
                 self.phase = TransactionPhase::Looking;
             }
@@ -487,7 +421,8 @@ impl Transaction {
 
     /// The part from which on everything is taken back.
     fn failed_part(&self) -> usize {
-        if self.interrupted || self.taken_down {
+        // Broken off, those before it stand only where they were being finished.
+        if self.interrupted || self.taken_down || self.broken_off && self.between.is_none() {
             return 0;
         }
         let forward = &self.forward;

@@ -49,6 +49,11 @@ impl Touched {
         self.calls = calls(frame).collect();
     }
 
+    /// The same, with no frame that takes its calls back.
+    pub fn without_calls(&self) -> Self {
+        Self { calls: FxHashSet::default(), ..self.clone() }
+    }
+
     /// It was all planned on the model of this revision.
     pub fn planned_at(&mut self, revision: u64) {
         self.planned = self.slots.iter().map(|slot| (*slot, revision)).collect();

@@ -8,6 +8,7 @@ use davit::platform::simulated::{Fault, FaultRule, Faults, Simulated, SimulatedO
 use davit::stack::Why;
 use davit::time::{Clock, Guard};
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -141,6 +142,8 @@ pub struct Rig {
     pub progress: Arc<Mutex<Vec<Progress>>>,
     pub submitted: Mutex<Vec<Request>>,
     pub clock: Clock,
+    /// After so many tellings whoever listens to the progress panics, once; 0: never.
+    pub trap: Arc<AtomicUsize>,
     next: Mutex<u64>,
     _guard: Guard,
 }
@@ -188,6 +191,8 @@ impl Rig {
         let sink = answers.clone();
         let progress: Arc<Mutex<Vec<Progress>>> = Arc::default();
         let told = progress.clone();
+        let trap: Arc<AtomicUsize> = Arc::default();
+        let trapped = trap.clone();
         let handle = Configurator::start(ConfiguratorSetup {
             operator: configurations.iter().map(|c| c.id).collect(),
             configurations,
@@ -201,7 +206,11 @@ impl Rig {
             limits,
             workers: 4,
             answers: Arc::new(move |answer| sink.lock().unwrap().push(answer)),
-            progress: Some(Arc::new(move |progress| told.lock().unwrap().push(progress.clone()))),
+            progress: Some(Arc::new(move |progress| {
+                told.lock().unwrap().push(progress.clone());
+                let left = trapped.fetch_update(Ordering::SeqCst, Ordering::SeqCst, |left| left.checked_sub(1));
+                assert!(left != Ok(1), "a listener fails");
+            })),
             conditions: None,
         });
         let told = handle.clone();
@@ -213,6 +222,7 @@ impl Rig {
             progress,
             submitted: Mutex::new(Vec::new()),
             clock,
+            trap,
             next: Mutex::new(1),
             _guard: guard,
         }

@@ -279,12 +279,13 @@ fn a_panic_in_the_configurator_is_answered_and_survived() {
     assert_eq!(rig.ask("eight"), ["eight.broken"]);
     assert_eq!(rig.ask("eight"), ["eight.ok"]);
     assert_eq!(rig.ask("eight.undo"), ["eight.undone"]);
-    // In the middle: B is stopped; the difference is known, and recovered.
+    // In the middle: B is stopped, which is left in a partial frame, and recovered.
     arm.store(true, Ordering::SeqCst);
     assert_eq!(rig.ask("switch"), ["switch.broken"]);
     let view = rig.view();
     let residual = view.broken.as_ref().expect("B is stopped").clone();
-    assert_eq!(residual.difference.iter().map(ToString::to_string).collect::<Vec<_>>(), ["stop B"]);
+    assert_eq!(residual.left.iter().map(ToString::to_string).collect::<Vec<_>>(), ["stop B"]);
+    assert!(residual.difference.is_empty() && view.stack.last().unwrap().partial, "{residual}");
     let deadline = rig.clock.now() + Duration::from_secs(20);
     assert_eq!(rig.handle.recover(Recovery::Back, deadline), Some(Ok(())));
     assert_eq!(rig.see(), before);
