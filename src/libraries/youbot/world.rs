@@ -4,7 +4,7 @@ use super::base::Twist2;
 use super::kinematics::Tool;
 use super::parameters::GRIPPER;
 use super::plant::{ArmPlant, BasePlant, base_rotation};
-use super::rigid_body::{ArmModel, J5};
+use super::rigid_body::{ArmModel, J5, Posture};
 use nalgebra::Vector3;
 
 /// Integration step, in s.
@@ -115,14 +115,40 @@ pub struct RobotBody {
     pub torque_lag: f64,
     /// What the motors give now, in N m.
     given: J5,
+    seen: Seen,
+}
+
+/// Where the parts of a robot are, with what it was worked out from: a step, whoever looks at what came of it, and the next step ask for
+/// the same.
+#[derive(Debug, Clone)]
+struct Seen {
+    q: J5,
+    qd: J5,
+    base: BasePlant,
+    at: Posture,
+    tool: Tool,
+}
+
+impl Seen {
+    fn of(arm: &ArmPlant, base: &BasePlant) -> Self {
+        let at = arm.posture();
+        let tool = Tool::at(&arm.model, &at, &arm.qd, base.pose, base.twist);
+        Self { q: arm.q, qd: arm.qd, base: *base, at, tool }
+    }
+
+    fn is_of(&self, arm: &ArmPlant, base: &BasePlant) -> bool {
+        self.q == arm.q && self.qd == arm.qd && self.base == *base
+    }
 }
 
 impl RobotBody {
     /// At rest with its joints at `q`; masses as multiples of the nominal ones.
     pub fn new(q: J5, mass_scale: f64) -> Self {
+        let (arm, base) = (ArmPlant::new(ArmModel::youbot(GRIPPER.mass, mass_scale), q), BasePlant::default());
         Self {
-            arm: ArmPlant::new(ArmModel::youbot(GRIPPER.mass, mass_scale), q),
-            base: BasePlant::default(),
+            seen: Seen::of(&arm, &base),
+            arm,
+            base,
             surroundings: Surroundings::default(),
             contact: Vector3::zeros(),
             on_bar: 0.0,
@@ -133,7 +159,16 @@ impl RobotBody {
 
     /// Where the tool is in the world, and how it moves.
     pub fn tool(&self) -> Tool {
-        Tool::of(&self.arm.model, &self.arm.q, &self.arm.qd, self.base.pose, self.base.twist)
+        match self.seen.is_of(&self.arm, &self.base) {
+            true => self.seen.tool,
+            false => Seen::of(&self.arm, &self.base).tool,
+        }
+    }
+
+    fn look(&mut self) {
+        if !self.seen.is_of(&self.arm, &self.base) {
+            self.seen = Seen::of(&self.arm, &self.base);
+        }
     }
 
     /// What the motors give now, in N m.
@@ -149,7 +184,8 @@ impl RobotBody {
         let mut done = 0.0;
         self.on_bar = 0.0;
         while done < steps {
-            let tool = self.tool();
+            self.look();
+            let tool = &self.seen.tool;
             self.contact = self.surroundings.force(&tool.position, &tool.velocity);
             let bar = self.surroundings.bar_force(&tool.position, &tool.velocity);
             self.contact.x += bar;
@@ -159,9 +195,10 @@ impl RobotBody {
             // Shorted windings have no torque of the drives' to follow.
             let follows = if braked || self.torque_lag <= 0.0 { 1.0 } else { 1.0 - (-step / self.torque_lag).exp() };
             self.given += (torque - self.given) * follows;
-            self.arm.step(&self.given, &force, &motion, braked, step);
+            self.arm.step(&self.seen.at, &self.given, &force, &motion, braked, step);
             done += 1.0;
         }
+        self.look();
     }
 }
 
