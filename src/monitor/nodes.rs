@@ -7,7 +7,7 @@ use super::window::{SinceWindow, Window};
 use crate::model::monitor::Comparison;
 
 /// A number, from samples and from numbers before it in the list.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Number {
     /// What an input holds.
     Input(usize),
@@ -58,7 +58,7 @@ impl Number {
 }
 
 /// Samples of one moment, or of some that lie close together.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 struct NodeMoment {
     first: u64,
     at: u64,
@@ -66,7 +66,7 @@ struct NodeMoment {
 }
 
 /// Counts samples in the time before now.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Rate {
     /// The time, in positions.
     window: u64,
@@ -160,7 +160,7 @@ impl Rate {
 }
 
 /// A truth, from samples, numbers, and truths before it in the list.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum TruthNode {
     /// Two numbers compared; `holds` is what it was before, for the hysteresis.
     Compare { left: usize, op: Comparison, right: usize, hysteresis: f64, holds: bool },

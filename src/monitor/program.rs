@@ -84,6 +84,12 @@ impl CompiledCondition {
         self.wake
     }
 
+    /// How many numbers and truths it is made of.
+    #[cfg(test)]
+    pub fn parts(&self) -> (usize, usize) {
+        (self.numbers.len(), self.truths.len())
+    }
+
     /// How many pieces were merged so far.
     pub fn merged(&self) -> u64 {
         self.numbers.iter().map(Number::merged).sum::<u64>() + self.truths.iter().map(TruthNode::merged).sum::<u64>()
