@@ -115,13 +115,13 @@ pub struct RobotBody {
     pub torque_lag: f64,
     /// What the motors give now, in N m.
     given: J5,
-    seen: Seen,
+    seen: SeenRobot,
 }
 
 /// Where the parts of a robot are, with what it was worked out from: a step, whoever looks at what came of it, and the next step ask for
 /// the same.
 #[derive(Debug, Clone)]
-struct Seen {
+struct SeenRobot {
     q: J5,
     qd: J5,
     base: BasePlant,
@@ -129,7 +129,7 @@ struct Seen {
     tool: Tool,
 }
 
-impl Seen {
+impl SeenRobot {
     fn of(arm: &ArmPlant, base: &BasePlant) -> Self {
         let at = arm.posture();
         let tool = Tool::at(&arm.model, &at, &arm.qd, base.pose, base.twist);
@@ -146,7 +146,7 @@ impl RobotBody {
     pub fn new(q: J5, mass_scale: f64) -> Self {
         let (arm, base) = (ArmPlant::new(ArmModel::youbot(GRIPPER.mass, mass_scale), q), BasePlant::default());
         Self {
-            seen: Seen::of(&arm, &base),
+            seen: SeenRobot::of(&arm, &base),
             arm,
             base,
             surroundings: Surroundings::default(),
@@ -161,13 +161,13 @@ impl RobotBody {
     pub fn tool(&self) -> Tool {
         match self.seen.is_of(&self.arm, &self.base) {
             true => self.seen.tool,
-            false => Seen::of(&self.arm, &self.base).tool,
+            false => SeenRobot::of(&self.arm, &self.base).tool,
         }
     }
 
     fn look(&mut self) {
         if !self.seen.is_of(&self.arm, &self.base) {
-            self.seen = Seen::of(&self.arm, &self.base);
+            self.seen = SeenRobot::of(&self.arm, &self.base);
         }
     }
 
@@ -249,6 +249,27 @@ mod tests {
         // One on each side of it, all three together, and nothing is felt across a gap.
         assert!(moved[1] > 0.05 && most > 3.0, "{moved:?} {most}");
         assert!((moved[0] - moved[1] - 0.02).abs() < 0.005 && moved[0] < bar.at - from, "{moved:?} {bar:?}");
+    }
+
+    #[test]
+    fn who_is_put_elsewhere_is_seen_there() {
+        let mut put = RobotBody::new(radians(WORKING_POSE_DEG), 1.0);
+        put.arm.q[1] += 0.3;
+        let mut there = RobotBody::new(put.arm.q, 1.0);
+        for at in [0.0, 1.0] {
+            for body in [&mut put, &mut there] {
+                body.base.pose.x = at;
+                body.surroundings.table = 0.3;
+                body.advance(&J5::zeros(), Twist2::default(), &Vector3::zeros(), false, PLANT_STEP);
+            }
+            assert_eq!(
+                (put.arm.q, put.contact, put.tool().position),
+                (there.arm.q, there.contact, there.tool().position)
+            );
+            assert!((there.tool().position.x - at).abs() < 0.6 && there.contact.z > 0.0, "{}", there.contact);
+        }
+        put.arm.q[0] += 1.0;
+        assert!(put.tool().position.y < -0.1, "{}", put.tool().position);
     }
 
     #[test]
