@@ -224,6 +224,16 @@ impl TruthNode {
         }
     }
 
+    /// Whether it may ever change though nothing it is made of does.
+    pub fn is_timed(&self) -> bool {
+        match self {
+            Self::Age { .. } | Self::Once(..) | Self::Historically(..) | Self::Since(..) | Self::Lived(..) => true,
+            // That a rise is over is seen by who evaluates.
+            Self::Compare { .. } | Self::IsTrue(_) | Self::Is(..) | Self::All(_) | Self::Any(_) => false,
+            Self::Not(_) | Self::Rise(..) | Self::Fall(..) => false,
+        }
+    }
+
     /// The next position at which it may change though nothing it is made of does.
     pub fn next(&self, position: u64, held: &[InputSample]) -> u64 {
         match self {
@@ -276,6 +286,11 @@ impl TruthNode {
 }
 
 impl Number {
+    /// As [`TruthNode::is_timed`].
+    pub fn is_timed(&self) -> bool {
+        matches!(self, Self::Rate(..))
+    }
+
     /// As [`TruthNode::next`].
     pub fn next(&self, position: u64) -> u64 {
         match self {
