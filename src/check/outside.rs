@@ -2,6 +2,7 @@
 
 use super::judge::created;
 use super::members::Member;
+use super::offers::Offers;
 use super::product::Product;
 use super::state::{Answers, Failed, Move, Next, Nexts, ProductState, Trouble, bit, index};
 use crate::limits;
@@ -9,6 +10,7 @@ use crate::model::{Ask, ConfigId, EventName, RequestId, Verdict};
 use crate::stack::{Batch, FrameId, Request, Requester, Why};
 use crate::statechart::{EdgeId, EventId};
 use smallvec::SmallVec;
+use std::rc::Rc;
 
 /// Events from outside that are heard somewhere, by their places, in order.
 type HeardEvents = SmallVec<[usize; 8]>;
@@ -79,8 +81,7 @@ impl Product<'_> {
     fn times_come(&mut self, state: &ProductState, nexts: &mut Nexts) -> HeardEvents {
         let mut heard = HeardEvents::new();
         for number in 0..self.members.len() {
-            let member = &mut self.members[number];
-            let offers = self.offers.of(number, member, state.leaves[number], &self.outside, &self.alike);
+            let offers = self.offered(state, number);
             heard.extend_from_slice(&offers.outside);
             for event in &offers.timed {
                 if state.moved & bit(number) != 0 {
@@ -100,10 +101,20 @@ impl Product<'_> {
         heard
     }
 
+    /// What a coordinator hears where it is.
+    fn offered(&mut self, state: &ProductState, number: usize) -> Rc<Offers> {
+        let member = &mut self.members[number];
+        self.offers.of(number, member, state.leaves[number], &self.outside, &self.alike)
+    }
+
     /// Each of these events comes from outside.
     fn events_come(&mut self, state: &ProductState, heard: HeardEvents, nexts: &mut Nexts) {
-        let busy: SmallVec<[bool; 4]> = (0..self.members.len()).map(|number| self.is_busy(state, number)).collect();
-        let any_busy = busy.contains(&true);
+        let mut busy: SmallVec<[Rc<Offers>; 2]> = SmallVec::new();
+        for number in 0..self.members.len() {
+            if self.is_busy(state, number) {
+                busy.push(self.offered(state, number));
+            }
+        }
         for at in heard {
             let name = self.outside[at];
             if self.waits_for_others() && state.stopping && name == self.deployment.deploy.event
@@ -112,9 +123,8 @@ impl Product<'_> {
             {
                 continue;
             }
-            let takes =
-                |(number, member): (usize, &mut Member<'_>)| busy[number] && member.takes(state.leaves[number], name);
-            if any_busy && self.members.iter_mut().enumerate().any(takes) {
+            // One for all that are like it, and they are taken where it is.
+            if busy.iter().any(|offers| offers.outside.binary_search(&at).is_ok()) {
                 nexts.cut = true;
                 continue;
             }

@@ -35,6 +35,16 @@ struct Compiler {
     pieces: usize,
 }
 
+/// Where a part stands that is made like this one, or the place of this one, now the last. Parts that are made alike of the same parts have
+/// the same history and are the same at every position: a condition that stands in several places of another one (with a name in Lua
+/// that is quickly so: each use of it is one more copy) is evaluated once. No part is a part of itself, so the condition itself still comes last.
+fn known_or_new<T: PartialEq>(parts: &mut Vec<T>, part: T) -> usize {
+    parts.iter().position(|known| *known == part).unwrap_or_else(|| {
+        parts.push(part);
+        parts.len() - 1
+    })
+}
+
 impl Compiler {
     fn slot(&mut self, input: MonitorInput) -> usize {
         self.slots.iter().position(|(known, _)| *known == input).unwrap_or_else(|| {
@@ -51,13 +61,11 @@ impl Compiler {
     }
 
     fn number(&mut self, number: Number) -> usize {
-        self.numbers.push(number);
-        self.numbers.len() - 1
+        known_or_new(&mut self.numbers, number)
     }
 
     fn truth(&mut self, truth: TruthNode) -> usize {
-        self.truths.push(truth);
-        self.truths.len() - 1
+        known_or_new(&mut self.truths, truth)
     }
 
     fn signals(&mut self, list: &[MonitoredSignal]) -> Box<[usize]> {
@@ -179,4 +187,42 @@ impl Compiler {
 
 fn ends(interval: Interval) -> (u64, u64) {
     (positions(interval.from), interval.to.map_or(u64::MAX, positions))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::MemberRef;
+
+    /// What an operator over time keeps is what it costs.
+    #[test]
+    fn what_stands_in_several_places_is_evaluated_once() {
+        let above = |bound: f64| {
+            let port = MonitorInput::whole(MemberRef::new("A.x").unwrap());
+            let MonitorInput::Port(port) = port else { unreachable!("a port") };
+            Condition::new(ConditionKind::Compare {
+                left: MonitoredSignal::new(SignalKind::Port(port)),
+                op: Comparison::Above,
+                right: MonitoredSignal::new(SignalKind::Constant(bound)),
+                hysteresis: None,
+            })
+        };
+        let lasts = |condition: &Condition, seconds| {
+            let time = Duration::from_secs(seconds);
+            Condition::new(ConditionKind::ForAtLeast { condition: Box::new(condition.clone()), time })
+        };
+        let no = |condition: &Condition| Condition::new(ConditionKind::No(Box::new(condition.clone())));
+        let all = |list: &[&Condition]| Condition::new(ConditionKind::All(list.iter().copied().cloned().collect()));
+        let parts = |condition: &Condition| compile(condition, PIECES).0.parts();
+        let (x, y) = (above(1.0), above(2.0));
+        // The port, a bound; the comparison, what was so for so long, that the history is as long, both.
+        assert_eq!(parts(&lasts(&x, 1)), (2, 4));
+        let twice = all(&[&lasts(&x, 1), &x, &lasts(&x, 1)]);
+        assert_eq!(parts(&twice), (2, 5));
+        assert_eq!(parts(&all(&[&twice, &x, &twice])), (2, 6));
+        // Another bound or time is another part, and so is what errs to the other side when its memory is used up.
+        assert_eq!(parts(&all(&[&x, &y])), (3, 3));
+        assert_eq!(parts(&all(&[&lasts(&x, 1), &lasts(&x, 2)])), (2, 8));
+        assert_eq!(parts(&all(&[&lasts(&x, 1), &no(&lasts(&x, 1))])), (2, 8));
+    }
 }

@@ -7,7 +7,7 @@ use super::window::{SinceWindow, Window};
 use crate::model::monitor::Comparison;
 
 /// A number, from samples and from numbers before it in the list.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Number {
     /// What an input holds.
     Input(usize),
@@ -58,7 +58,7 @@ impl Number {
 }
 
 /// Samples of one moment, or of some that lie close together.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 struct NodeMoment {
     first: u64,
     at: u64,
@@ -66,7 +66,7 @@ struct NodeMoment {
 }
 
 /// Counts samples in the time before now.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Rate {
     /// The time, in positions.
     window: u64,
@@ -160,7 +160,7 @@ impl Rate {
 }
 
 /// A truth, from samples, numbers, and truths before it in the list.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum TruthNode {
     /// Two numbers compared; `holds` is what it was before, for the hysteresis.
     Compare { left: usize, op: Comparison, right: usize, hysteresis: f64, holds: bool },
@@ -224,6 +224,16 @@ impl TruthNode {
         }
     }
 
+    /// Whether it may ever change though nothing it is made of does.
+    pub fn is_timed(&self) -> bool {
+        match self {
+            Self::Age { .. } | Self::Once(..) | Self::Historically(..) | Self::Since(..) | Self::Lived(..) => true,
+            // That a rise is over is seen by who evaluates.
+            Self::Compare { .. } | Self::IsTrue(_) | Self::Is(..) | Self::All(_) | Self::Any(_) => false,
+            Self::Not(_) | Self::Rise(..) | Self::Fall(..) => false,
+        }
+    }
+
     /// The next position at which it may change though nothing it is made of does.
     pub fn next(&self, position: u64, held: &[InputSample]) -> u64 {
         match self {
@@ -276,6 +286,11 @@ impl TruthNode {
 }
 
 impl Number {
+    /// As [`TruthNode::is_timed`].
+    pub fn is_timed(&self) -> bool {
+        matches!(self, Self::Rate(..))
+    }
+
     /// As [`TruthNode::next`].
     pub fn next(&self, position: u64) -> u64 {
         match self {

@@ -5,7 +5,7 @@ use super::ring::{RingBuffer, grain};
 
 /// Pieces from old to new; values fall from front to back, since a piece that is followed by a larger one can never be the
 /// largest again.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Pieces {
     ring: RingBuffer<Piece>,
     most: usize,
@@ -15,7 +15,7 @@ pub struct Pieces {
     merged: u64,
 }
 
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 struct Piece {
     /// The position at which the first of those leaves that became this one.
     first: u64,

@@ -11,6 +11,10 @@ pub struct CompiledCondition {
     truths: Vec<TruthNode>,
     values: Vec<f64>,
     grades: Vec<Grade>,
+    /// Which numbers and which truths may change though nothing that they are made of does: few of them.
+    timed: (Box<[usize]>, Box<[usize]>),
+    /// Which truths are a rise or a fall.
+    steps: Box<[usize]>,
     /// Where the history is evaluated up to.
     position: u64,
     /// The next position at which something may change though no sample comes.
@@ -23,7 +27,9 @@ impl CompiledCondition {
     /// The last of the truths is the condition.
     pub fn new(numbers: Vec<Number>, truths: Vec<TruthNode>) -> Self {
         let (values, grades) = (vec![f64::NAN; numbers.len()], vec![Grade::BOTTOM; truths.len()]);
-        Self { numbers, truths, values, grades, position: 0, next: u64::MAX, wake: u64::MAX }
+        let timed = (places(&numbers, Number::is_timed), places(&truths, TruthNode::is_timed));
+        let steps = places(&truths, |truth| matches!(truth, TruthNode::Rise(..) | TruthNode::Fall(..)));
+        Self { numbers, truths, values, grades, timed, steps, position: 0, next: u64::MAX, wake: u64::MAX }
     }
 
     /// Forgets the history.
@@ -36,25 +42,28 @@ impl CompiledCondition {
 
     /// What the condition is at `position`, which is after all before; in between nothing changed but by [`Self::next`].
     pub fn evaluate(&mut self, position: u64, held: &[InputSample]) -> Grade {
-        let mut next = u64::MAX;
-        for i in 0..self.numbers.len() {
-            self.values[i] = self.numbers[i].value(position, held, &self.values[..i]);
-            next = next.min(self.numbers[i].next(position));
+        for (i, number) in self.numbers.iter_mut().enumerate() {
+            self.values[i] = number.value(position, held, &self.values);
         }
-        for i in 0..self.truths.len() {
-            let truth = &mut self.truths[i];
-            self.grades[i] = truth.value(position, held, &self.values, &self.grades[..i]);
-            next = next.min(truth.next(position, held));
+        for (i, truth) in self.truths.iter_mut().enumerate() {
+            self.grades[i] = truth.value(position, held, &self.values, &self.grades);
+        }
+        let mut next = u64::MAX;
+        for i in &self.timed.0 {
+            next = next.min(self.numbers[*i].next(position));
+        }
+        for i in &self.timed.1 {
+            next = next.min(self.truths[*i].next(position, held));
         }
         let mut wake = next;
-        for (i, truth) in self.truths.iter().enumerate() {
+        for i in &self.steps {
             // What rose is not rising any more right behind.
-            let (TruthNode::Rise(of, _) | TruthNode::Fall(of, _)) = truth else { continue };
+            let (TruthNode::Rise(of, _) | TruthNode::Fall(of, _)) = &self.truths[*i] else { continue };
             let settled = self.grades[*of].and(self.grades[*of].contrary());
-            if settled != self.grades[i] {
+            if settled != self.grades[*i] {
                 next = next.min(position + 1);
             }
-            if settled.holds != self.grades[i].holds {
+            if settled.holds != self.grades[*i].holds {
                 wake = wake.min(position + 1);
             }
         }
@@ -84,8 +93,20 @@ impl CompiledCondition {
         self.wake
     }
 
+    /// How many numbers and truths it is made of.
+    #[cfg(test)]
+    pub fn parts(&self) -> (usize, usize) {
+        (self.numbers.len(), self.truths.len())
+    }
+
     /// How many pieces were merged so far.
     pub fn merged(&self) -> u64 {
-        self.numbers.iter().map(Number::merged).sum::<u64>() + self.truths.iter().map(TruthNode::merged).sum::<u64>()
+        let numbers = self.timed.0.iter().map(|i| self.numbers[*i].merged());
+        // Only what looks back has something to merge.
+        numbers.chain(self.timed.1.iter().map(|i| self.truths[*i].merged())).sum()
     }
+}
+
+fn places<T>(parts: &[T], are: impl Fn(&T) -> bool) -> Box<[usize]> {
+    parts.iter().enumerate().filter(|(_, part)| are(part)).map(|(i, _)| i).collect()
 }

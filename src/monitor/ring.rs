@@ -5,7 +5,7 @@ use std::ops::{Deref, DerefMut};
 
 /// A queue of at most so many elements. A copy has taken its memory too, so that one made of a template at run time
 /// allocates nothing afterwards.
-#[derive(Debug)]
+#[derive(Debug, PartialEq)]
 pub struct RingBuffer<T> {
     queue: VecDeque<T>,
     most: usize,

@@ -5,7 +5,7 @@ use super::pieces::Pieces;
 use super::ring::{RingBuffer, grain};
 
 /// The largest value that a condition had from `oldest` to `newest` positions ago.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Window {
     /// How many positions the newer end lies back.
     newest: u64,
@@ -124,7 +124,7 @@ impl Window {
 /// `hold` since `from`, at most `oldest` positions ago.
 ///
 /// With a newer end in the past it is what this was then, and `hold` ever after: see `compile`.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct SinceWindow {
     oldest: u64,
     open: Option<(Grade, Grade)>,

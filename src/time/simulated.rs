@@ -302,10 +302,7 @@ impl Scheduler {
                 return Called::Nobody;
             }
             self.now.fetch_max(at.0, Ordering::AcqRel);
-            while let Some((next, _)) = state.next_timer()
-                && next == at
-                && let Some(wait) = state.pop_timer()
-            {
+            while let Some(wait) = state.pop_timer(at) {
                 state.make_ready(wait);
             }
         }

@@ -149,10 +149,10 @@ impl SchedulerState {
         eager.into_iter().chain(idle).min().map(|(at, id, _)| (at, id))
     }
 
-    /// Takes it.
-    pub(super) fn pop_timer(&mut self) -> Option<WaitUntil> {
+    /// Takes the next one that waits for this moment, the earliest that somebody waits for.
+    pub(super) fn pop_timer(&mut self, at: Time) -> Option<WaitUntil> {
         let (eager, idle) = (self.next_eager(), self.next_idle());
-        let first = eager.into_iter().chain(idle).min()?;
+        let first = eager.into_iter().chain(idle).min().filter(|first| first.0 == at)?;
         if idle == Some(first) {
             self.idle.retain(|timer| *timer != first);
         } else {

@@ -81,6 +81,13 @@ fn condition() -> impl Strategy<Value = Condition> {
             5 => (one(), one(), interval()).prop_map(|(hold, from, interval)| K::Since { hold, from, interval }),
             2 => (one(), ns(1..9)).prop_map(|(condition, time)| K::ForAtLeast { condition, time }),
             2 => (one(), ns(1..9)).prop_map(|(condition, time)| K::WithinLast { condition, time }),
+            // The same condition in several places, as one with a name stands in a file: it has one history there.
+            2 => (one(), ns(1..9)).prop_map(|(condition, time)| {
+                let lasts = Condition::new(K::ForAtLeast { condition: condition.clone(), time });
+                let (hold, interval) = (Condition::new(K::No(condition.clone())), Interval { from: time, to: None });
+                let since = K::Since { hold: hold.into(), from: lasts.clone().into(), interval };
+                K::Any(vec![*condition, lasts, Condition::new(since)])
+            }),
         ]
         .prop_map(Condition::new)
     })

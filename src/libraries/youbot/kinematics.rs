@@ -4,7 +4,7 @@ use super::base::{Pose2, Twist2};
 use super::dynamics::Jacobian8;
 use super::parameters::JOINTS;
 use super::plant::base_rotation;
-use super::rigid_body::{ArmModel, J5, manipulability};
+use super::rigid_body::{ArmModel, J5, Posture, manipulability};
 use nalgebra::{UnitQuaternion, Vector3};
 
 /// The tool in the world frame.
@@ -27,7 +27,11 @@ pub struct Tool {
 impl Tool {
     /// Of an arm at angles `q` and speeds `qd`, on a base at `base` moving with `twist`.
     pub fn of(model: &ArmModel, q: &J5, qd: &J5, base: Pose2, twist: Twist2) -> Self {
-        let at = model.posture(q);
+        Self::at(model, &model.posture(q), qd, base, twist)
+    }
+
+    /// The same of an arm whose pose is known.
+    pub fn at(model: &ArmModel, at: &Posture, qd: &J5, base: Pose2, twist: Twist2) -> Self {
         let arm = at.jacobian();
         let turn = base_rotation(base);
         let lever = model.mount + at.tool;

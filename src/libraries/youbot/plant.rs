@@ -2,7 +2,7 @@
 
 use super::base::{Pose2, Twist2};
 use super::parameters::{BASE_LAG, BASE_MOUNT, COULOMB, JOINTS, RANGE_LOWER_DEG, RANGE_UPPER_DEG, VISCOUS};
-use super::rigid_body::{ArmModel, BaseMotion, J5, M5, radians};
+use super::rigid_body::{ArmModel, BaseMotion, J5, M5, Posture, radians};
 use nalgebra::{Rotation3, Vector3};
 
 /// Stiffness of the mechanical stops, in N m/rad (assumed: stiff, and slow enough for a step of 0.5 ms).
@@ -50,10 +50,10 @@ impl ArmPlant {
     /// Semi-implicit Euler; everything that dissipates enters the equation implicitly. Coulomb friction is what it is, a
     /// force that takes any value up to its limit at rest and the limit against the motion: the speed is the one that minimizes the
     /// step's energy with it, found joint by joint (projected Gauss and Seidel). So friction stops a joint, holds it, and never makes it chatter.
-    pub fn step(&mut self, torque: &J5, force: &Vector3<f64>, base: &BaseMotion, braked: bool, dt: f64) {
-        let at = self.model.posture(&self.q);
-        let mut mass = self.model.mass_matrix_with_drives(&at);
-        let bias = self.model.inverse_dynamics(&at, &self.qd, &J5::zeros(), base);
+    ///
+    /// `at` is where its parts are now: who moves it has worked that out.
+    pub fn step(&mut self, at: &Posture, torque: &J5, force: &Vector3<f64>, base: &BaseMotion, braked: bool, dt: f64) {
+        let (mut mass, bias) = self.model.mass_and_bias(at, &self.qd, base);
         let mut push = at.jacobian().tr_mul(force) - bias;
         if !braked {
             push += torque;
@@ -90,8 +90,7 @@ impl ArmPlant {
     }
 
     /// Where it is.
-    #[cfg(test)]
-    pub fn posture(&self) -> super::rigid_body::Posture {
+    pub fn posture(&self) -> Posture {
         self.model.posture(&self.q)
     }
 }
@@ -120,7 +119,7 @@ fn with_friction(mass: &M5, momentum: &J5, most: &J5, guess: J5) -> J5 {
 }
 
 /// The base: follows a commanded twist with a first-order lag.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct BasePlant {
     /// Where it stands.
     pub pose: Pose2,
@@ -172,7 +171,7 @@ mod tests {
             let mut before = arm.energy();
             let start = before;
             for _ in 0..4000 {
-                arm.step(&J5::zeros(), &Vector3::zeros(), &BaseMotion::default(), false, 0.0005);
+                arm.step(&arm.posture(), &J5::zeros(), &Vector3::zeros(), &BaseMotion::default(), false, 0.0005);
                 let now = arm.energy();
                 // Without friction the integrator wobbles about the true energy; with it nothing may come back.
                 let bound = if friction == 0.0 { start.max(0.0) * 1.01 } else { before + 1e-3 };
@@ -199,7 +198,7 @@ mod tests {
                     1 => arm.model.gravity(&arm.posture()) + sway,
                     _ => arm.model.gravity(&arm.posture()) + J5::from(COULOMB) * 1.05,
                 };
-                arm.step(&torque, &Vector3::zeros(), &BaseMotion::default(), false, dt);
+                arm.step(&arm.posture(), &torque, &Vector3::zeros(), &BaseMotion::default(), false, dt);
             }
             arm.q
         };
@@ -216,7 +215,7 @@ mod tests {
         let before = arm.q;
         for _ in 0..2000 {
             let torque = arm.model.gravity(&arm.posture()) + J5::from(COULOMB) * 0.99;
-            arm.step(&torque, &Vector3::zeros(), &BaseMotion::default(), false, 0.0005);
+            arm.step(&arm.posture(), &torque, &Vector3::zeros(), &BaseMotion::default(), false, 0.0005);
         }
         assert_eq!(arm.q, before, "not a creep of a nanoradian");
     }
@@ -227,7 +226,7 @@ mod tests {
             let mut arm = arm(degrees);
             let before = arm.posture().tool.z;
             for _ in 0..2000 {
-                arm.step(&J5::zeros(), &Vector3::zeros(), &BaseMotion::default(), true, 0.0005);
+                arm.step(&arm.posture(), &J5::zeros(), &Vector3::zeros(), &BaseMotion::default(), true, 0.0005);
             }
             before - arm.posture().tool.z
         };
@@ -241,7 +240,7 @@ mod tests {
         let before = arm.q;
         for _ in 0..4000 {
             let torque = arm.model.gravity(&arm.posture());
-            arm.step(&torque, &Vector3::zeros(), &BaseMotion::default(), false, 0.0005);
+            arm.step(&arm.posture(), &torque, &Vector3::zeros(), &BaseMotion::default(), false, 0.0005);
         }
         assert!((arm.q - before).norm() < 1e-6);
     }

@@ -129,10 +129,12 @@ impl ArmModel {
         out
     }
 
-    fn body(&self, at: &Posture, i: usize) -> RigidBody {
-        let r = at.rotations[i].matrix();
-        let b = &self.links[i];
-        RigidBody { mass: b.mass, com: at.origins[i] + r * b.com, inertia: r * b.inertia * r.transpose() }
+    /// The links where they are.
+    fn bodies(&self, at: &Posture) -> [RigidBody; JOINTS] {
+        std::array::from_fn(|i| {
+            let (r, b) = (at.rotations[i].matrix(), &self.links[i]);
+            RigidBody { mass: b.mass, com: at.origins[i] + r * b.com, inertia: r * b.inertia * r.transpose() }
+        })
     }
 
     /// Joint torques that hold the arm still against gravity, in N m.
@@ -159,10 +161,14 @@ impl ArmModel {
 
     /// The mass matrix, in kg m², without the drives' inertia.
     pub fn mass_matrix(&self, at: &Posture) -> M5 {
+        Self::mass_matrix_of(&self.bodies(at), at)
+    }
+
+    fn mass_matrix_of(bodies: &[RigidBody; JOINTS], at: &Posture) -> M5 {
         let mut out = M5::zeros();
         let mut composite = RigidBody { mass: 0.0, com: Vector3::zeros(), inertia: Matrix3::zeros() };
         for i in (0..JOINTS).rev() {
-            composite = self.body(at, i).join(composite);
+            composite = bodies[i].join(composite);
             // Wrench that accelerates joint i alone at 1 rad/s², about the composite body's centre of mass.
             let force = at.axes[i].cross(&(composite.com - at.origins[i])) * composite.mass;
             let torque = composite.inertia * at.axes[i];
@@ -177,16 +183,32 @@ impl ArmModel {
 
     /// The mass matrix with the drives' inertia seen through the gears, in kg m².
     pub fn mass_matrix_with_drives(&self, at: &Posture) -> M5 {
-        let mut m = self.mass_matrix(at);
+        self.with_drives(self.mass_matrix(at))
+    }
+
+    fn with_drives(&self, mut m: M5) -> M5 {
         for i in 0..JOINTS {
             m[(i, i)] += self.reflected[i];
         }
         m
     }
 
+    /// The mass matrix with the drives' inertia, and the torques that hold the speeds `qd` as they are, together: both are made of the
+    /// links where they are.
+    pub fn mass_and_bias(&self, at: &Posture, qd: &J5, base: &BaseMotion) -> (M5, J5) {
+        let bodies = self.bodies(at);
+        let mass = self.with_drives(Self::mass_matrix_of(&bodies, at));
+        (mass, Self::inverse_dynamics_of(&bodies, at, qd, &J5::zeros(), base))
+    }
+
     /// Joint torques for the accelerations `qdd` at speeds `qd` (gravity, Coriolis and centrifugal terms included; the
     /// drives' inertia is not), in N m.
+    #[cfg(any(test, feature = "internals"))]
     pub fn inverse_dynamics(&self, at: &Posture, qd: &J5, qdd: &J5, base: &BaseMotion) -> J5 {
+        Self::inverse_dynamics_of(&self.bodies(at), at, qd, qdd, base)
+    }
+
+    fn inverse_dynamics_of(bodies: &[RigidBody; JOINTS], at: &Posture, qd: &J5, qdd: &J5, base: &BaseMotion) -> J5 {
         let mut forces = [Vector3::zeros(); JOINTS];
         let mut torques = [Vector3::zeros(); JOINTS];
         let mut levers = [Vector3::zeros(); JOINTS];
@@ -199,7 +221,7 @@ impl ArmModel {
             let spin = at.axes[i] * qd[i];
             dw += at.axes[i] * qdd[i] + w.cross(&spin);
             w += spin;
-            let body = self.body(at, i);
+            let body = &bodies[i];
             let s = body.com - at.origins[i];
             forces[i] = (acc + dw.cross(&s) + w.cross(&w.cross(&s))) * body.mass;
             torques[i] = body.inertia * dw + w.cross(&(body.inertia * w));

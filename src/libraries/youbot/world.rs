@@ -4,7 +4,7 @@ use super::base::Twist2;
 use super::kinematics::Tool;
 use super::parameters::GRIPPER;
 use super::plant::{ArmPlant, BasePlant, base_rotation};
-use super::rigid_body::{ArmModel, J5};
+use super::rigid_body::{ArmModel, J5, Posture};
 use nalgebra::Vector3;
 
 /// Integration step, in s.
@@ -115,14 +115,40 @@ pub struct RobotBody {
     pub torque_lag: f64,
     /// What the motors give now, in N m.
     given: J5,
+    seen: SeenRobot,
+}
+
+/// Where the parts of a robot are, with what it was worked out from: a step, whoever looks at what came of it, and the next step ask for
+/// the same.
+#[derive(Debug, Clone)]
+struct SeenRobot {
+    q: J5,
+    qd: J5,
+    base: BasePlant,
+    at: Posture,
+    tool: Tool,
+}
+
+impl SeenRobot {
+    fn of(arm: &ArmPlant, base: &BasePlant) -> Self {
+        let at = arm.posture();
+        let tool = Tool::at(&arm.model, &at, &arm.qd, base.pose, base.twist);
+        Self { q: arm.q, qd: arm.qd, base: *base, at, tool }
+    }
+
+    fn is_of(&self, arm: &ArmPlant, base: &BasePlant) -> bool {
+        self.q == arm.q && self.qd == arm.qd && self.base == *base
+    }
 }
 
 impl RobotBody {
     /// At rest with its joints at `q`; masses as multiples of the nominal ones.
     pub fn new(q: J5, mass_scale: f64) -> Self {
+        let (arm, base) = (ArmPlant::new(ArmModel::youbot(GRIPPER.mass, mass_scale), q), BasePlant::default());
         Self {
-            arm: ArmPlant::new(ArmModel::youbot(GRIPPER.mass, mass_scale), q),
-            base: BasePlant::default(),
+            seen: SeenRobot::of(&arm, &base),
+            arm,
+            base,
             surroundings: Surroundings::default(),
             contact: Vector3::zeros(),
             on_bar: 0.0,
@@ -133,7 +159,16 @@ impl RobotBody {
 
     /// Where the tool is in the world, and how it moves.
     pub fn tool(&self) -> Tool {
-        Tool::of(&self.arm.model, &self.arm.q, &self.arm.qd, self.base.pose, self.base.twist)
+        match self.seen.is_of(&self.arm, &self.base) {
+            true => self.seen.tool,
+            false => SeenRobot::of(&self.arm, &self.base).tool,
+        }
+    }
+
+    fn look(&mut self) {
+        if !self.seen.is_of(&self.arm, &self.base) {
+            self.seen = SeenRobot::of(&self.arm, &self.base);
+        }
     }
 
     /// What the motors give now, in N m.
@@ -149,7 +184,8 @@ impl RobotBody {
         let mut done = 0.0;
         self.on_bar = 0.0;
         while done < steps {
-            let tool = self.tool();
+            self.look();
+            let tool = &self.seen.tool;
             self.contact = self.surroundings.force(&tool.position, &tool.velocity);
             let bar = self.surroundings.bar_force(&tool.position, &tool.velocity);
             self.contact.x += bar;
@@ -159,9 +195,10 @@ impl RobotBody {
             // Shorted windings have no torque of the drives' to follow.
             let follows = if braked || self.torque_lag <= 0.0 { 1.0 } else { 1.0 - (-step / self.torque_lag).exp() };
             self.given += (torque - self.given) * follows;
-            self.arm.step(&self.given, &force, &motion, braked, step);
+            self.arm.step(&self.seen.at, &self.given, &force, &motion, braked, step);
             done += 1.0;
         }
+        self.look();
     }
 }
 
@@ -212,6 +249,27 @@ mod tests {
         // One on each side of it, all three together, and nothing is felt across a gap.
         assert!(moved[1] > 0.05 && most > 3.0, "{moved:?} {most}");
         assert!((moved[0] - moved[1] - 0.02).abs() < 0.005 && moved[0] < bar.at - from, "{moved:?} {bar:?}");
+    }
+
+    #[test]
+    fn who_is_put_elsewhere_is_seen_there() {
+        let mut put = RobotBody::new(radians(WORKING_POSE_DEG), 1.0);
+        put.arm.q[1] += 0.3;
+        let mut there = RobotBody::new(put.arm.q, 1.0);
+        for at in [0.0, 1.0] {
+            for body in [&mut put, &mut there] {
+                body.base.pose.x = at;
+                body.surroundings.table = 0.3;
+                body.advance(&J5::zeros(), Twist2::default(), &Vector3::zeros(), false, PLANT_STEP);
+            }
+            assert_eq!(
+                (put.arm.q, put.contact, put.tool().position),
+                (there.arm.q, there.contact, there.tool().position)
+            );
+            assert!((there.tool().position.x - at).abs() < 0.6 && there.contact.z > 0.0, "{}", there.contact);
+        }
+        put.arm.q[0] += 1.0;
+        assert!(put.tool().position.y < -0.1, "{}", put.tool().position);
     }
 
     #[test]
