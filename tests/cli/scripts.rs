@@ -211,6 +211,29 @@ fn a_fault_goes_into_a_component_at_its_time() {
     }
 }
 
+/// What components raise of safety stands in the text while nothing is being stopped, too; what else they raise does not.
+#[test]
+fn what_is_of_safety_is_told_as_text() {
+    for (what, event, from) in [
+        (
+            "raise('e_estop') wait_answer('safe_hold.ok', 1) apply('stop_all', { force = true })",
+            "e_arm_dropped",
+            "youbot",
+        ),
+        ("inject('youbot', 'panic')", "e_arm_fell", "World"),
+    ] {
+        let text =
+            format!("wait_state('copying', 20) {what} wait_answer('{event}', 1) wait(0.1) say('on its way down')");
+        let ran = script(&Demo::new(), &format!("deploy('@youbot_arm.yaml') {text}"), &[]);
+        let (before, after) = ran.out.split_once("on its way down").unwrap_or_else(|| panic!("{}{}", ran.out, ran.err));
+        assert_eq!(before.matches(&format!("..  {event} from {from}\n")).count(), 1, "{}", ran.out);
+        assert!(!before.contains("e_qos_ok") && after.contains("..  e_qos_ok from Monitors\n"), "{}", ran.out);
+    }
+}
+
+/// The configurator is no component: what it knows is said wherever something else is asked of it.
+const ONE_FAULT: &str = "the configurator knows one fault, without parameters: `inject(\"configurator\", \"panic\")`";
+
 #[test]
 fn what_cannot_be_injected_is_named_at_its_line() {
     for (text, says) in [
@@ -221,9 +244,19 @@ fn what_cannot_be_injected_is_named_at_its_line() {
         ("inject('gain', 'stall', 0.5)", "`inject` takes parameters as a table"),
         ("wait(1) inject('gain', 'panic', nil, 0.5)", "`inject` at 0.5 s, and it is 1 s already"),
         ("inject('gain', 'panic', nil, 9) wait(1) shutdown()", "script.lua:2: `panic` was to happen to `gain` at 9 s"),
+        ("inject('configurator', 'panik')", ONE_FAULT),
+        ("inject('configurator', 'stall', { seconds = 1 })", ONE_FAULT),
+        ("inject('configurator', 'panic', { seconds = 1 })", ONE_FAULT),
+        ("inject('configurator', 'panic', 0.5)", "`inject` takes parameters as a table, and this is a number"),
+        ("wait(1) inject('configurator', 'panic', nil, 0.5)", "`inject` at 0.5 s, and it is 1 s already"),
+        (
+            "inject('configurator', 'panic', nil, 9) wait(1) shutdown()",
+            "script.lua:2: `panic` was to happen to `configurator` at 9 s",
+        ),
     ] {
         let said = refused(text);
-        assert!(said.contains(says) && said.contains("script.lua:2"), "{text}: {said}");
+        assert!(said.contains("script.lua:2"), "{text}: {said}");
+        assert_eq!(said.matches(says).count(), 1, "{text}: {said}");
     }
     let ran = script(&Demo::new(), "deploy('deployment.yaml') inject('source', 'panic')", &["--quiet"]);
     assert!(ran.code == 1 && ran.err.contains("on this platform"), "{}", ran.err);

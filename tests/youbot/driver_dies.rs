@@ -22,3 +22,11 @@ fn it_is_noticed_wherever_the_drives_have_power() {
         run("driver_dies_elsewhere.lua", &[("where", place)], 1);
     }
 }
+
+/// The parent's world sees it, and `configs/youbot/place.lua` tells whose arm it is.
+#[test]
+fn whose_arm_came_down_is_told_and_the_other_one_is_not() {
+    for who in ["left", "right"] {
+        run("fell.lua", &[("who", who)], 3);
+    }
+}

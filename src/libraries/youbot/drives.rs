@@ -7,6 +7,7 @@ use super::parameters::{
 };
 use super::plant::joint_ranges;
 use super::rigid_body::{ArmModel, J5, radians};
+use stopping::SETTLES;
 use task::DriveTask;
 
 mod stopping;
@@ -148,6 +149,8 @@ pub struct Drives {
     task: DriveTask,
     target: J5,
     target_speed: J5,
+    /// For how long the arm is still slowed before it is held where it is then, in s.
+    settles: f64,
     outside: bool,
     base_watched: bool,
 }
@@ -171,6 +174,7 @@ impl Drives {
             task: DriveTask::Idle,
             target,
             target_speed: J5::zeros(),
+            settles: 0.0,
             outside: false,
             base_watched: false,
         }
@@ -241,6 +245,7 @@ impl Drives {
         self.task = DriveTask::Idle;
         self.target = self.measured.q;
         self.target_speed = self.measured.qd;
+        self.settles = SETTLES;
         self.resumes |= self.mode == DriveMode::Torque;
         self.mode = DriveMode::Positioning;
         self.handover.begin();
@@ -304,6 +309,7 @@ impl Drives {
         report: &mut impl FnMut(DriveHappening),
     ) -> DriveOutput {
         self.measured = measured;
+        self.settles = (self.settles - dt).max(0.0);
         self.advance_task(dt, report);
         let command = match twist {
             // The base is heard while torques are: whoever stops the arm stops the base.
