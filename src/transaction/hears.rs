@@ -35,9 +35,9 @@ impl Transaction {
                 }
             }
             Input::Interrupt(by) => {
-                if !self.broken_off {
-                    self.stopped_by = Some(Reason::Interrupted(by));
-                }
+                self.stopped_by = Some(Reason::Interrupted(by));
+                // Its frame counts on what it interrupts going back.
+                self.broken_off = false;
                 self.interrupted = true;
                 self.asked_back = false;
                 self.held = true;

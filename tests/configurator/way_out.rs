@@ -374,6 +374,23 @@ fn there_is_a_way_out_of_what_was_found() {
         ),
         // What was found otherwise, and was being mended when a safe configuration came, is otherwise still.
         (vec![(apply("roll"), 2), (safe("rest"), 0)], vec![on("stop C", silent), on("start C", fails)]),
+        // What a panic has broken off goes back all the same where a safe configuration interrupts it.
+        (
+            vec![
+                (Act::Undo(0), 0),
+                (Act::Operator(place(&PLAIN, "again")), 2),
+                (Act::Panic, 0),
+                (Act::Safe(place(&SAFE, "quiet")), 0),
+            ],
+            vec![],
+        ),
+        // What whoever listens fails at is lost, and nothing else.
+        (vec![(Act::Trap(9), 0), (Act::Instead(0, 9), 0)], vec![on("create C", 1)]),
+        (
+            vec![(Act::Panic, 1), (Act::Trap(9), 0), (Act::Instead(0, 7), 2), (Act::UndoSafe(0), 0), (Act::Safe(0), 0)],
+            vec![],
+        ),
+        (vec![(Act::Apply(0), 0), (Act::Trap(4), 0), (apply("tune"), 0), (Act::Apply(0), 0)], vec![]),
     ];
     for (acts, faults) in found {
         leads_out(&acts, &faults).unwrap_or_else(|failed| panic!("{acts:?} {faults:?}: {failed}"));
