@@ -304,31 +304,31 @@ impl Transaction {
         let mut parts: Vec<PartEnd> = Vec::with_capacity(self.planned.parts.len());
         for (at, _) in self.planned.parts.iter().enumerate() {
             parts.push(if finishing && at + 1 == part {
-                self.broken(at, residual.clone(), wanted.snapshot_some(&own), whole, live)
+                self.broken(at, residual.clone(), wanted.snapshot_some(&own), whole, wanted)
             } else if finishing && at == part {
                 self.taken_back_whole(at)
             } else if at < part {
                 if missing.contains(&at) {
-                    self.broken(at, Residual::of(self.reason()), Snapshot::default(), false, live)
+                    self.broken(at, Residual::of(self.reason()), Snapshot::default(), false, wanted)
                 } else {
                     PartEnd::Done
                 }
             } else if self.broken_off {
                 match at == blamed && !clean {
-                    true => self.broken(at, residual.clone(), wanted.snapshot_some(&own), whole, live),
-                    false if left.contains(&at) => self.broken(at, own_left(at), Snapshot::default(), whole, live),
+                    true => self.broken(at, residual.clone(), wanted.snapshot_some(&own), whole, wanted),
+                    false if left.contains(&at) => self.broken(at, own_left(at), Snapshot::default(), whole, wanted),
                     false => self.broken_whole(residual.observed),
                 }
             } else if !clean && self.interrupted {
                 match at == blamed {
-                    true => self.broken(at, residual.clone(), wanted.snapshot_some(&own), whole, live),
-                    false if left.contains(&at) => self.broken(at, own_left(at), Snapshot::default(), whole, live),
+                    true => self.broken(at, residual.clone(), wanted.snapshot_some(&own), whole, wanted),
+                    false if left.contains(&at) => self.broken(at, own_left(at), Snapshot::default(), whole, wanted),
                     false => self.taken_back_whole(at),
                 }
             } else if at == part {
                 match clean {
                     true => self.taken_back_whole(at),
-                    false => self.broken(at, residual.clone(), wanted.snapshot_some(&own), whole, live),
+                    false => self.broken(at, residual.clone(), wanted.snapshot_some(&own), whole, wanted),
                 }
             } else if self.interrupted || self.taken_down {
                 self.taken_back_whole(at)
@@ -378,15 +378,16 @@ impl Transaction {
         missing
     }
 
-    /// What takes back what is left of a part, as far as safe configurations have left it to that.
-    fn items_left(&self, part: usize, live: &System) -> Vec<DraftStep> {
+    /// What takes back what is left of a part, as far as safe configurations have left it to that, from the system as it should be: what
+    /// differs from that is mended first.
+    fn items_left(&self, part: usize, wanted: &System) -> Vec<DraftStep> {
         let forward = &self.forward;
         let left: Vec<u32> = (self.remaining(part).into_iter())
             .chain(self.perhaps.iter().copied())
             .filter(|i| self.part_of(*i) == part)
             .collect();
         let mut heed = Heed::new(&self.touched, left.iter().map(|i| &forward.list[*i as usize].step));
-        let mut view = Overlay::new(live);
+        let mut view = Overlay::new(wanted);
         let mut items = Vec::new();
         for i in left.iter().rev() {
             let goes_back = self.goes_back(*i, part, &self.touched, &mut heed);
@@ -402,7 +403,7 @@ impl Transaction {
 
     /// A part that is neither done nor taken back. `whole`: going to `expected` takes all of it back, and its frame has
     /// nothing to add to that.
-    fn broken(&self, part: usize, residual: Residual, expected: Snapshot, whole: bool, live: &System) -> PartEnd {
+    fn broken(&self, part: usize, residual: Residual, expected: Snapshot, whole: bool, wanted: &System) -> PartEnd {
         let planned = &self.planned.parts[part];
         let undone = planned.pushes.is_none();
         let items: Vec<DraftStep> = if whole && !undone {
@@ -410,7 +411,7 @@ impl Transaction {
         } else if undone {
             self.items_open(planned.own())
         } else {
-            self.items_left(part, live)
+            self.items_left(part, wanted)
         };
         // A safe configuration that is being undone demands nothing any more of what is back, and perhaps broken.
         let demands = !(undone && planned.frame.as_ref().is_some_and(|frame| frame.safe));

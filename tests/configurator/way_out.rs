@@ -374,6 +374,8 @@ fn there_is_a_way_out_of_what_was_found() {
         ),
         // What was found otherwise, and was being mended when a safe configuration came, is otherwise still.
         (vec![(apply("roll"), 2), (safe("rest"), 0)], vec![on("stop C", silent), on("start C", fails)]),
+        // What was done though the platform said that it was not is mended before what is left is taken back.
+        (vec![(Act::Operator(place(&PLAIN, "again")), 3), (safe("slow"), 0)], vec![on("start C", silent)]),
         // What a panic has broken off goes back all the same where a safe configuration interrupts it.
         (
             vec![
