@@ -9,7 +9,7 @@ use super::{PlanStage, PlannedStep, SavedValue, StepId};
 use crate::model::{Call, ComponentName, Origin, Policy, RunState, Step, Transition, Wanted};
 pub use crate::system::step::absolute;
 use crate::system::touch::{components, slot};
-use crate::system::{Overlay, System, Undo, View, Violation, step};
+use crate::system::{Overlay, System, Undo, View, Violation, is_so, step};
 use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
 use std::collections::{BTreeMap, BTreeSet};
@@ -159,13 +159,17 @@ impl<'o, 's> Script<'o, 's> {
         self.push(item, wave, after).map(Some)
     }
 
-    /// Adds a step of what is left of something that was taken back in part: what had brought its component to where a property
-    /// may be set may be gone without it, so that is done for it and taken back.
+    /// Adds a step of what is left of something that was taken back in part. What is so already, whoever did it, is not left any more;
+    /// and what had brought its component to where a property may be set may be gone without it, so that is done for it and taken
+    /// back.
     ///
     /// # Errors
     /// The false preconditions.
     pub fn add_left(&mut self, item: DraftStep, wave: u32, after: &[StepId]) -> Result<Option<StepId>, Vec<Violation>> {
-        let Step::PropertySet { property, value } = &item.step else { return self.add(item, wave, after) };
+        let Step::PropertySet { property, value } = &item.step else {
+            let failed = self.failed.contains(&item.step.component());
+            return if !failed && is_so(&item.step, self.view) { Ok(None) } else { self.add(item, wave, after) };
+        };
         let component = property.component;
         let Some(node) = self.view.component(component) else { return self.add(item, wave, after) };
         let (state, declared) = (node.state, node.property(property.member).map(|(_, declared)| declared.tunable));

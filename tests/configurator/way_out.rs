@@ -376,6 +376,8 @@ fn there_is_a_way_out_of_what_was_found() {
         (vec![(apply("roll"), 2), (safe("rest"), 0)], vec![on("stop C", silent), on("start C", fails)]),
         // What was done though the platform said that it was not is mended before what is left is taken back.
         (vec![(Act::Operator(place(&PLAIN, "again")), 3), (safe("slow"), 0)], vec![on("start C", silent)]),
+        // What is left of one request, and was brought about by mending what was left of another, is left no more.
+        (vec![(apply("halt"), 2), (Act::Instead(2, 12), 5)], vec![(place(&STEPS, "start A"), 1, 2)]),
         // What a panic has broken off goes back all the same where a safe configuration interrupts it.
         (
             vec![
