@@ -176,6 +176,9 @@ fn heard(deployment: &Deployment, chart: &Chart, told: &BTreeSet<EventName>, fin
     known.extend([deployment.deploy.event.as_str(), deployment.shutdown.event.as_str()]);
     known.extend(deployment.reactions.iter().map(|reaction| reaction.raise.as_str()));
     known.extend(deployment.monitors.iter().flat_map(Monitor::events).map(|e| e.as_str()));
+    let accepted: BTreeSet<&str> = deployment.interface.accepts.iter().map(|(event, _)| event.as_str()).collect();
+    // Another number is another thing, and no slip.
+    let letters = |name: &str| name.replace(|c: char| c.is_ascii_digit(), "");
     let declared: BTreeSet<EventName> =
         deployment.safety.iter().chain(&deployment.emits).map(|(event, _)| *event).collect();
     let mut said: BTreeSet<EventName> = BTreeSet::new();
@@ -183,7 +186,8 @@ fn heard(deployment: &Deployment, chart: &Chart, told: &BTreeSet<EventName>, fin
         for trigger in chart.triggers(edge).unwrap_or(&[]) {
             let text = chart.event_text(*trigger);
             let Ok(event) = EventName::new(&text) else { continue };
-            if is_internal(&text) || answers.contains(&event) || known.contains(text.as_str()) || !said.insert(event) {
+            let raised = known.contains(text.as_str()) || accepted.contains(text.as_str());
+            if is_internal(&text) || answers.contains(&event) || raised || !said.insert(event) {
                 continue;
             }
             let at = chart.edge_origin(edge);
@@ -197,13 +201,17 @@ fn heard(deployment: &Deployment, chart: &Chart, told: &BTreeSet<EventName>, fin
                 if !declared.contains(&event)
                     && !told.contains(&event)
                     && listed(chart, *trigger) < 2
-                    && let Some(near) = nearest(&text, known.iter().copied())
+                    && let Some(near) = nearest(&text, known.union(&accepted).copied())
                     && strsim::damerau_levenshtein(&text, near) <= slips
+                    && letters(&text) != letters(near)
                 {
                     findings.push(
                         Finding::warning(
                             COORD_NEAR_EVENT,
-                            format!("`{event}` is nearly `{near}`, which the deployment raises"),
+                            format!(
+                                "`{event}` is nearly `{near}`, which the deployment {}",
+                                if known.contains(near) { "raises" } else { "accepts" }
+                            ),
                         )
                         .at(at)
                         .help(format!(

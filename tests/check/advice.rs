@@ -102,6 +102,8 @@ fn a_near_event_is_a_slip_where_it_is_near_enough_and_nobody_declares_it() {
     assert_eq!(listens(&["e_shudwon"], ""), 1, "two letters of a long one");
     assert_eq!(listens(&["e_tart", "e_tart"], ""), 0, "nobody slips twice in the same way");
     assert_eq!(listens(&["e_tart"], "safety: [e_tart]\n"), 0, "declared");
+    assert_eq!(listens(&["e_rest"], "accepts: [e_reset]\n"), 1, "one letter of what a parent raises");
+    assert_eq!(listens(&["e_5dof"], "accepts: [e_8dof]\n"), 0, "another number is another thing");
 }
 
 #[test]
