@@ -1,6 +1,7 @@
 //! After a panic of the configurator's own thread (semantics: *What goes wrong*): it begins anew. What was under way ends
 //! *broken*, with a partial frame of what was done of it; what is safe goes on, and what that has interrupted goes back.
 
+use super::control::InTurn;
 use super::engine::Engine;
 use super::pool::Pool;
 use super::progress::Progress;
@@ -18,7 +19,7 @@ use std::sync::atomic::Ordering;
 
 impl Engine {
     /// A panic was caught. Neither may one while beginning anew end the thread, nor one that comes again and again keep it busy
-    /// for ever: then nothing is known of what was under way, and who asked is told so.
+    /// for ever: then what is under way ends at once, on what the model knows, and what waits is answered, since it may be what panics.
     pub(super) fn survive(&mut self, text: &str) {
         self.panics += 1;
         let _ = catch_unwind(AssertUnwindSafe(|| {
@@ -26,21 +27,36 @@ impl Engine {
                 progress(&Progress::Survived(text.to_owned()));
             }
         }));
+        let reason = Reason::Panic(text.to_owned());
         let again = self.panics > limits::PANICS_IN_A_ROW;
-        if again || catch_unwind(AssertUnwindSafe(|| self.start_anew(text))).is_err() {
-            self.drop_all(text, again);
+        if again {
+            self.running.iter_mut().filter(|running| !running.is_safe()).for_each(|running| running.panics = u8::MAX);
+        }
+        if catch_unwind(AssertUnwindSafe(|| self.start_anew(&reason))).is_err() {
+            self.end_all(&reason);
+        }
+        if again {
+            for request in self.desk.cancel_waiting(|_| true) {
+                self.owe(request);
+                let _ = catch_unwind(AssertUnwindSafe(|| self.answer_unserved(&reason)));
+            }
+        }
+        // Nothing else is left to stop what is up.
+        if let Some((deadline, reply)) = self.forced.take().filter(|_| !again) {
+            let force = InTurn::Force { deadline, reply };
+            self.counts.command_again(force.only_asks());
+            self.commands.push_front(force);
         }
     }
 
-    fn start_anew(&mut self, text: &str) {
-        let reason = Reason::Panic(text.to_owned());
+    fn start_anew(&mut self, reason: &Reason) {
         // It may have been taking everything down: what comes from now on begins again.
         self.taking_down = false;
         let Self { running, world, pool, given, .. } = self;
         for running in running {
-            running.survives(&reason, &mut world.system, pool, &*given.platform);
+            running.survives(reason, &mut world.system, pool, &*given.platform);
         }
-        self.answer_unserved(&reason);
+        self.answer_unserved(reason);
         // Nobody is left to release what a safe configuration has interrupted, if the panic came where that had ended.
         if !self.running.iter().any(Running::is_safe) {
             self.release(Touched::default());
@@ -89,23 +105,17 @@ impl Engine {
         }
     }
 
-    /// Nothing of what was under way is known any more. `all`: what waits is answered as well, since it may be what panics.
-    fn drop_all(&mut self, text: &str, all: bool) {
-        for running in std::mem::take(&mut self.running) {
-            let Self { pool, given, .. } = self;
-            let _ = catch_unwind(AssertUnwindSafe(|| running.give_up_calls(pool, &*given.platform)));
-        }
-        self.desk.under_way().to_vec().iter().for_each(|active| self.desk.over(active.number));
-        let reason = Reason::Panic(text.to_owned());
-        let _ = catch_unwind(AssertUnwindSafe(|| self.break_current(&reason)));
-        self.current.clear();
-        if all {
-            for request in self.desk.cancel_waiting(|_| true) {
-                self.owe(request);
-                let _ = catch_unwind(AssertUnwindSafe(|| self.break_current(&reason)));
-                self.current.clear();
+    /// Everything that is under way ends now. Of what not even that is possible with nothing is known any more.
+    fn end_all(&mut self, reason: &Reason) {
+        for mut running in std::mem::take(&mut self.running) {
+            running.panics = u8::MAX;
+            let Self { pool, given, world, .. } = self;
+            let survives = || running.survives(reason, &mut world.system, pool, &*given.platform);
+            if catch_unwind(AssertUnwindSafe(survives)).is_ok() {
+                self.running.push(running);
             }
         }
+        let _ = catch_unwind(AssertUnwindSafe(|| self.answer_unserved(reason)));
     }
 
     /// What has begun and was not answered is answered: nobody knows how far it came.
@@ -120,6 +130,10 @@ impl Engine {
     /// What somebody waited for who is gone: what is done is booked, and what is left of it is kept.
     pub(super) fn abandoned(&mut self, mut machine: Transaction, since: crate::stack::FrameId) {
         let end = machine.end();
+        // What force had begun it begins again, and leaves no frame of.
+        if self.forced.is_some() {
+            return;
+        }
         for (part, ended) in machine.planned().parts.iter().zip(end.parts) {
             match ended {
                 PartEnd::Done => _ = self.world.stack.apply([&part.edits], &[]),

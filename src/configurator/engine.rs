@@ -2,7 +2,7 @@
 
 use super::conditions::{Conditions, Standings};
 use super::confirmations::Confirmations;
-use super::control::{ConfiguratorView, ControlCommand, InTurn, Moment, StoppingBegan, UrgentCommand};
+use super::control::{ConfiguratorView, ControlCommand, InTurn, Moment, StoppingBegan, TakenDown, UrgentCommand};
 use super::inbox::{Counts, Mail};
 use super::looks::Observing;
 use super::pool::Pool;
@@ -17,7 +17,7 @@ use crate::plan::PlanContext;
 use crate::platform::{Platform, PlatformEvent};
 use crate::stack::claims::Claims;
 use crate::stack::{Arrived, Batch, Desk, FrameId, LedDown, Requester, Why, World};
-use crate::time::{Clock, Receiver, RecvError, Time};
+use crate::time::{Clock, Receiver, RecvError, Sender, Time};
 use rustc_hash::{FxHashMap, FxHashSet};
 use smallvec::SmallVec;
 use std::any::Any;
@@ -101,6 +101,8 @@ pub(super) struct Engine {
     pub hurried: bool,
     /// Panics since there was last nothing to be done.
     pub panics: usize,
+    /// Force that is under way: until when it may take, and who is told.
+    pub forced: Option<(Time, Sender<TakenDown>)>,
     /// A listener has panicked when it was told an answer.
     pub listener: Option<Box<dyn Any + Send>>,
 }
@@ -137,6 +139,7 @@ impl Engine {
             leaving_inside: (0, SmallVec::new()),
             hurried: false,
             panics: 0,
+            forced: None,
             listener: None,
         }
     }
@@ -484,17 +487,5 @@ impl Engine {
         let told = |frame: &FrameId| self.world.broken.iter().any(|broken| broken.frame == Some(*frame));
         let left = self.partials.iter().filter(|(frame, _)| !told(frame));
         left.map(|(_, residual)| residual.of_partial(&self.world.system)).collect()
-    }
-
-    /// Everything that still waits is answered.
-    fn bid_farewell(&mut self) {
-        self.glance();
-        self.break_current(&Reason::Ended);
-        let safe = std::mem::take(&mut self.safety.waiting);
-        let waiting = self.desk.cancel_waiting(|_| true);
-        for request in safe.into_iter().chain(waiting).filter(|request| request.why == Why::Asked) {
-            let now = self.given.clock.now();
-            self.tell_answer(request, request.ask.failed(), Some(Arc::new(Reason::Ended)), now);
-        }
     }
 }

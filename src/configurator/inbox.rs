@@ -111,6 +111,11 @@ impl Counts {
         self.room_of(asks).0.fetch_sub(1, Ordering::AcqRel);
     }
 
+    /// A command is to be taken up again.
+    pub fn command_again(&self, asks: bool) {
+        self.room_of(asks).0.fetch_add(1, Ordering::AcqRel);
+    }
+
     /// Where a command is counted, and how many there may be: whoever only asks takes no place from what must not be lost.
     fn room_of(&self, asks: bool) -> (&AtomicUsize, usize) {
         match asks {

@@ -30,7 +30,9 @@ impl Engine {
                 let _ = reply.try_send(down);
             }
             InTurn::Force { deadline, reply } => {
+                self.forced = Some((deadline, reply.clone()));
                 let down = self.force(deadline);
+                self.forced = None;
                 let _ = reply.try_send(down);
             }
             InTurn::DiscardStack => {
@@ -39,6 +41,18 @@ impl Engine {
                 self.changed();
             }
             InTurn::Stop => self.stopping = true,
+        }
+    }
+
+    /// Everything that still waits is answered.
+    pub(super) fn bid_farewell(&mut self) {
+        self.glance();
+        self.break_current(&Reason::Ended);
+        let safe = std::mem::take(&mut self.safety.waiting);
+        let waiting = self.desk.cancel_waiting(|_| true);
+        for request in safe.into_iter().chain(waiting).filter(|request| request.why == Why::Asked) {
+            let now = self.given.clock.now();
+            self.tell_answer(request, request.ask.failed(), Some(Arc::new(Reason::Ended)), now);
         }
     }
 

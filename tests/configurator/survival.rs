@@ -356,3 +356,38 @@ fn what_is_under_way_at_the_end_is_answered() {
     assert_eq!(events, ["make.broken", "wire.failed"]);
     rig.each_answered_once();
 }
+
+#[test]
+fn however_often_it_panics_a_call_under_way_is_left_to_its_undo() {
+    for times in [1, 9] {
+        let rig = up_with(vec![configuration("open", "", "call A.open", "")]);
+        let of = vec![(StepPattern::new("operation_call"), Duration::from_millis(300))];
+        rig.platform.set_delays(Delays { of, ..Delays::default() });
+        rig.submit("open");
+        rig.wait(0.1);
+        (0..times).for_each(|_| assert!(rig.handle.inject_panic()));
+        rig.wait(10.0);
+        assert_eq!(rig.events()[3..], ["open.broken"]);
+        assert!(rig.view().stack.last().unwrap().partial, "{times}");
+        assert_eq!(rig.ask("open.undo"), ["open.undone"]);
+        let told = rig.progress.lock().unwrap();
+        let closed = |told: &davit::configurator::Progress| matches!(told, davit::configurator::Progress::Ended { step, .. } if step.to_string() == "operation_call A.close");
+        assert!(told.iter().any(closed), "{times}");
+        drop(told);
+        rig.each_answered_once();
+    }
+}
+
+#[test]
+fn a_panic_does_not_end_force() {
+    let rig = up_with(vec![]);
+    rig.platform
+        .set_delays(Delays { of: vec![(StepPattern::new("stop"), Duration::from_millis(200))], ..Delays::default() });
+    let deadline = rig.clock.now() + Duration::from_secs(30);
+    let answer = rig.handle.force_down(deadline);
+    rig.wait(0.3);
+    assert!(rig.handle.inject_panic());
+    let told = answer.recv_deadline(deadline).expect("it is told how it ended");
+    assert!(told.is_clean(), "{told:?}");
+    assert!(rig.see().is_empty());
+}

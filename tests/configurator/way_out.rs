@@ -128,8 +128,8 @@ enum Act {
     /// An operator's, who means it.
     Operator(usize),
     OperatorUndo(usize),
-    /// The configurator's thread panics.
-    Panic,
+    /// The configurator's thread panics, so many times in one moment.
+    Panic(usize),
     /// Whoever listens to it does, after so many tellings.
     Trap(usize),
 }
@@ -142,7 +142,7 @@ impl Act {
             Self::Undo(n) | Self::OperatorUndo(n) => format!("{}.undo", PLAIN[n]),
             Self::Safe(n) => SAFE[n].to_owned(),
             Self::UndoSafe(n) => format!("{}.undo", SAFE[n]),
-            Self::Panic | Self::Trap(_) => String::new(),
+            Self::Panic(_) | Self::Trap(_) => String::new(),
         }
     }
 }
@@ -162,7 +162,7 @@ fn acts() -> impl Strategy<Value = Vec<(Act, usize)>> {
 
 /// The same, with panics in between.
 fn acts_and_panics() -> impl Strategy<Value = Vec<(Act, usize)>> {
-    let panic = prop_oneof![2 => Just(Act::Panic), 3 => (1usize..30).prop_map(Act::Trap)];
+    let panic = prop_oneof![1 => Just(Act::Panic(1)), 1 => Just(Act::Panic(9)), 3 => (1usize..30).prop_map(Act::Trap)];
     let panics = prop::collection::vec((0usize..6, panic, 0usize..6), 1..4);
     (acts(), panics).prop_map(|(mut acts, panics)| {
         for (at, panic, wait) in panics {
@@ -221,7 +221,7 @@ fn leads_out(acts: &[(Act, usize)], faults: &[(usize, usize, u32)]) -> Result<&'
         let operator = matches!(act, Act::Operator(_) | Act::OperatorUndo(_));
         let by = if operator { Requester::Operator } else { coordinator(COORDINATOR) };
         match act {
-            Act::Panic => assert!(rig.handle.inject_panic()),
+            Act::Panic(times) => (0..*times).for_each(|_| assert!(rig.handle.inject_panic())),
             Act::Trap(tellings) => rig.trap.store(*tellings, Ordering::SeqCst),
             _ => rig.submit_as(&act.word(), by).unwrap(),
         }
@@ -383,15 +383,23 @@ fn there_is_a_way_out_of_what_was_found() {
             vec![
                 (Act::Undo(0), 0),
                 (Act::Operator(place(&PLAIN, "again")), 2),
-                (Act::Panic, 0),
+                (Act::Panic(1), 0),
                 (Act::Safe(place(&SAFE, "quiet")), 0),
             ],
             vec![],
         ),
+        // However often it panics, what a call may have done is not forgotten.
+        (vec![(apply("lift"), 2), (Act::Panic(9), 0)], vec![]),
         // What whoever listens fails at is lost, and nothing else.
         (vec![(Act::Trap(9), 0), (Act::Instead(0, 9), 0)], vec![on("create C", 1)]),
         (
-            vec![(Act::Panic, 1), (Act::Trap(9), 0), (Act::Instead(0, 7), 2), (Act::UndoSafe(0), 0), (Act::Safe(0), 0)],
+            vec![
+                (Act::Panic(1), 1),
+                (Act::Trap(9), 0),
+                (Act::Instead(0, 7), 2),
+                (Act::UndoSafe(0), 0),
+                (Act::Safe(0), 0),
+            ],
             vec![],
         ),
         (vec![(Act::Apply(0), 0), (Act::Trap(4), 0), (apply("tune"), 0), (Act::Apply(0), 0)], vec![]),
