@@ -41,11 +41,19 @@ impl Engine {
                 let _ = catch_unwind(AssertUnwindSafe(|| self.answer_unserved(&reason)));
             }
         }
-        // Nothing else is left to stop what is up.
-        if let Some((deadline, reply)) = self.forced.take().filter(|_| !again) {
-            let force = InTurn::Force { deadline, reply };
-            self.counts.command_again(force.only_asks());
-            self.commands.push_front(force);
+        self.command_again(reason, again);
+    }
+
+    /// What was being carried out in its turn begins again: nothing else is left to stop what is up, and who waits is told. But what
+    /// an operator wants recovered has left behind how far it came, and goes on when it is asked for once more.
+    fn command_again(&mut self, reason: Reason, again: bool) {
+        match self.doing.take() {
+            Some(InTurn::Recover { reply, .. }) => _ = reply.try_send(Err(Arc::new(Residual::of(reason)))),
+            Some(command) if !again => {
+                self.counts.command_again(command.only_asks());
+                self.commands.push_front(command);
+            }
+            _ => {}
         }
     }
 
@@ -131,7 +139,7 @@ impl Engine {
     pub(super) fn abandoned(&mut self, mut machine: Transaction, since: crate::stack::FrameId) {
         let end = machine.end();
         // What force had begun it begins again, and leaves no frame of.
-        if self.forced.is_some() {
+        if matches!(self.doing, Some(InTurn::Force { .. })) {
             return;
         }
         for (part, ended) in machine.planned().parts.iter().zip(end.parts) {

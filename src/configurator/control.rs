@@ -187,6 +187,7 @@ pub(super) enum UrgentCommand {
 }
 
 /// Waits until what is being done has an end, or gives way.
+#[derive(Clone)]
 pub(super) enum InTurn {
     Drift { reply: Sender<Drift> },
     Recover { direction: Recovery, reply: Sender<Result<(), Arc<Residual>>> },

@@ -2,7 +2,7 @@
 
 use super::conditions::{Conditions, Standings};
 use super::confirmations::Confirmations;
-use super::control::{ConfiguratorView, ControlCommand, InTurn, Moment, StoppingBegan, TakenDown, UrgentCommand};
+use super::control::{ConfiguratorView, ControlCommand, InTurn, Moment, StoppingBegan, UrgentCommand};
 use super::inbox::{Counts, Mail};
 use super::looks::Observing;
 use super::pool::Pool;
@@ -17,7 +17,7 @@ use crate::plan::PlanContext;
 use crate::platform::{Platform, PlatformEvent};
 use crate::stack::claims::Claims;
 use crate::stack::{Arrived, Batch, Desk, FrameId, LedDown, Requester, Why, World};
-use crate::time::{Clock, Receiver, RecvError, Sender, Time};
+use crate::time::{Clock, Receiver, RecvError, Time};
 use rustc_hash::{FxHashMap, FxHashSet};
 use smallvec::SmallVec;
 use std::any::Any;
@@ -101,8 +101,8 @@ pub(super) struct Engine {
     pub hurried: bool,
     /// Panics since there was last nothing to be done.
     pub panics: usize,
-    /// Force that is under way: until when it may take, and who is told.
-    pub forced: Option<(Time, Sender<TakenDown>)>,
+    /// The command that is being carried out: a panic that takes it does not end it.
+    pub doing: Option<InTurn>,
     /// A listener has panicked when it was told an answer.
     pub listener: Option<Box<dyn Any + Send>>,
 }
@@ -139,7 +139,7 @@ impl Engine {
             leaving_inside: (0, SmallVec::new()),
             hurried: false,
             panics: 0,
-            forced: None,
+            doing: None,
             listener: None,
         }
     }

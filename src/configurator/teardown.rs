@@ -16,6 +16,7 @@ use std::sync::Arc;
 
 impl Engine {
     pub(super) fn in_turn(&mut self, command: InTurn) {
+        self.doing = Some(command.clone());
         match command {
             InTurn::Drift { reply } => {
                 let drift = self.drift();
@@ -30,9 +31,7 @@ impl Engine {
                 let _ = reply.try_send(down);
             }
             InTurn::Force { deadline, reply } => {
-                self.forced = Some((deadline, reply.clone()));
                 let down = self.force(deadline);
-                self.forced = None;
                 let _ = reply.try_send(down);
             }
             InTurn::DiscardStack => {
@@ -42,6 +41,7 @@ impl Engine {
             }
             InTurn::Stop => self.stopping = true,
         }
+        self.doing = None;
     }
 
     /// Everything that still waits is answered.

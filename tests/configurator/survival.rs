@@ -332,8 +332,8 @@ fn after_a_panic_while_everything_is_taken_down_requests_begin_again() {
     // When the second frame is popped.
     arm.store(true, Ordering::SeqCst);
     let deadline = rig.clock.now() + Duration::from_secs(30);
-    let told = rig.handle.take_back(deadline).recv_deadline(deadline);
-    assert!(told.is_err(), "nobody is left to tell it: {told:?}");
+    let told = rig.handle.take_back(deadline).recv_deadline(deadline).expect("it begins again, and is told");
+    assert!(told.is_clean(), "{told:?}");
     assert_eq!(rig.ask("fresh"), ["fresh.ok"]);
     assert!(rig.see().components.contains_key(&name("D")));
     rig.in_step();
@@ -390,4 +390,47 @@ fn a_panic_does_not_end_force() {
     let told = answer.recv_deadline(deadline).expect("it is told how it ended");
     assert!(told.is_clean(), "{told:?}");
     assert!(rig.see().is_empty());
+}
+
+#[test]
+fn a_panic_does_not_end_the_second_stage_of_stopping() {
+    let rig = up_with(vec![]);
+    rig.platform
+        .set_delays(Delays { of: vec![(StepPattern::new("stop"), Duration::from_millis(200))], ..Delays::default() });
+    let deadline = rig.clock.now() + Duration::from_secs(30);
+    let answer = rig.handle.take_back(deadline);
+    rig.wait(0.3);
+    assert!(rig.handle.inject_panic());
+    let told = answer.recv_deadline(deadline).expect("it is told how it ended");
+    assert!(told.is_clean() && told.kept.is_empty() && told.troubles.is_empty(), "{told:?}");
+    assert!(rig.clock.now() < deadline, "it is told when it is over");
+    assert!(rig.see().is_empty());
+}
+
+/// Who recovers something is told at once what became of it, and may go on.
+#[test]
+fn a_panic_while_something_is_recovered_is_told() {
+    let mut hold = configuration("hold", "B:stopped", "set B.k 9; set B.s 3", "B:running");
+    hold.on_failure = OnFailure::Hold;
+    let rig = up_with(vec![hold]);
+    let before = rig.see();
+    rig.inject("start B", Fault::Fail);
+    assert_eq!(rig.ask("hold"), ["hold.broken"]);
+    rig.platform.set_faults(Faults::default());
+    rig.platform
+        .set_delays(Delays { of: vec![(StepPattern::new("start"), Duration::from_millis(300))], ..Delays::default() });
+    let began = rig.clock.now();
+    let deadline = began + Duration::from_secs(30);
+    let (handle, told) = (rig.handle.clone(), Arc::new(std::sync::Mutex::new(None)));
+    let tells = told.clone();
+    let asks = rig.clock.spawn("operator", move || *tells.lock().unwrap() = handle.recover(Recovery::Back, deadline));
+    rig.wait(0.1);
+    assert!(rig.handle.inject_panic());
+    asks.join(deadline).expect("it comes back");
+    let left = told.lock().unwrap().take().expect("an answer").expect_err("it was broken off");
+    assert!(matches!(left.cause, Reason::Panic(_)), "{left}");
+    assert!(rig.clock.now() < began + Duration::from_secs(1), "it is told at once");
+    rig.wait(1.0);
+    assert_eq!(rig.handle.recover(Recovery::Back, rig.clock.now() + Duration::from_secs(30)), Some(Ok(())));
+    assert_eq!(rig.see(), before);
 }

@@ -2,7 +2,7 @@
 //! configurations.
 //!
 //! Every law runs over `DAVIT_LAW_CASES` cases, 10,000 where it is not set; `DAVIT_LAW_CASES=1000000 cargo test --release
-//! --test laws` is a long run.
+//! --test laws` is a long run. Each run tries other cases; with `PROPTEST_RNG_SEED` set, as `.ci/run` does, always the same.
 
 mod alone;
 mod atomicity;
