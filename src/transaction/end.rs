@@ -3,9 +3,10 @@
 use super::heed::Heed;
 use super::{Can, Transaction, TransactionPhase};
 use crate::model::{Cause, ComponentName, RunState, Snapshot, Step};
-use crate::plan::footprint::Footprint;
+use crate::plan::footprint::{Footprint, Slot};
 use crate::plan::undo::DraftStep;
 use crate::stack::{Edits, Ending, Frame, FrameId, Inverse, Part, Reason, Residual};
+use crate::system::touch::Access;
 use crate::system::{Overlay, System, Undo, View as _, step, touch};
 use rustc_hash::FxHashSet;
 use std::ops::Range;
@@ -418,7 +419,13 @@ impl Transaction {
         let left: FxHashSet<ComponentName> = residual.components().filter(|_| demands).collect();
         let irreversible = residual.irreversible.first().cloned();
         let floor = irreversible.map(|step| format!("`{step}` cannot be undone"));
-        let frame = planned.frame.as_deref().map(|frame| partial(frame, items, &left, floor));
+        let frame = planned.frame.as_deref().map(|frame| {
+            let mut frame = partial(frame, items, &left, floor);
+            if !demands {
+                demand_no_more(&mut frame);
+            }
+            frame
+        });
         let instead = if undone { frame.as_ref().map(|frame| frame.id) } else { None };
         let residual = Arc::new(residual);
         // Of a frame that was being undone nothing is: it stays as it is.
@@ -454,6 +461,15 @@ impl Transaction {
         }
         (gone, also)
     }
+}
+
+/// Of the run states that are back where they were before it a partial frame says nothing any more.
+fn demand_no_more(frame: &mut Frame) {
+    let open = |component: ComponentName| frame.moved(component).is_some();
+    let touches = frame.footprint.touches.iter().copied();
+    let touches =
+        touches.filter(|touch| !matches!(touch.slot, Slot::State(of) if touch.access == Access::Write && !open(of)));
+    frame.footprint = Arc::new(Footprint { touches: touches.collect() });
 }
 
 /// A frame of which only `items` are left to be undone; it is about these, and about `also`.
