@@ -137,7 +137,7 @@ pub fn run(path: &Path, options: ScriptOptions) -> ScriptEnd {
     let clock = options.clock.clone();
     let _participant = clock.enter();
     let folder = path.parent().unwrap_or(Path::new("")).to_owned();
-    let parameters = parameters::ScriptParameters::new(&options.load.set);
+    let parameters = parameters::ScriptParameters::new(&options.load.set, &text);
     let host = Rc::new(RefCell::new(ScriptHost {
         options,
         folder,

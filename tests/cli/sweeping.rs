@@ -74,4 +74,10 @@ fn what_is_not_read_or_not_written_so_is_named() {
     assert!(ran.code == 2 && ran.err.contains("script::unknown_parameter"), "{}{}", ran.out, ran.err);
     let ran = demo.run(&["run", "plain.lua", "--set", "k=2"]);
     assert_eq!((ran.code, ran.out.as_str()), (0, "ran\n"));
+    // Also one that it comes to behind `deploy`, and not one that it has passed by.
+    demo.write("late.lua", "deploy('deployment.yaml')\nif param ('k', 1) == 1 then param(\"late\", 1) end say('ran')");
+    let ran = demo.run(&["run", "late.lua", "--clock", "simulated", "--quiet", "--set", "k=1", "--set", "late=3"]);
+    assert_eq!((ran.code, ran.out.as_str()), (0, "ran\n"), "{}", ran.err);
+    let ran = demo.run(&["run", "late.lua", "--clock", "simulated", "--quiet", "--set", "k=2", "--set", "late=3"]);
+    assert!(ran.code == 2 && ran.err.contains("nothing reads the parameter `late`"), "{}{}", ran.out, ran.err);
 }

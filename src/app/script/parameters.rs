@@ -10,19 +10,22 @@ use mlua::{Lua, Value};
 pub(super) struct ScriptParameters {
     given: Vec<(String, String)>,
     read: Vec<String>,
+    /// Those of them that the script's text reads somewhere: they are its own, also where it comes to that behind `deploy`.
+    own: Vec<String>,
     /// Somebody else may have read the rest: a deployment that was loaded with it.
     handed_on: bool,
 }
 
 impl ScriptParameters {
-    pub(super) fn new(given: &[(String, String)]) -> Self {
-        Self { given: given.to_vec(), ..Self::default() }
+    pub(super) fn new(given: &[(String, String)], text: &str) -> Self {
+        let own = given.iter().map(|(name, _)| name).filter(|name| reads(text, name)).cloned().collect();
+        Self { given: given.to_vec(), own, ..Self::default() }
     }
 
     /// What the script has not read, and a deployment may.
     pub(super) fn for_deployments(&mut self) -> Vec<(String, String)> {
         self.handed_on = true;
-        self.given.iter().filter(|(name, _)| !self.read.contains(name)).cloned().collect()
+        self.given.iter().filter(|(name, _)| !self.read.contains(name) && !self.own.contains(name)).cloned().collect()
     }
 
     /// What to say of one that nobody reads.
@@ -33,8 +36,9 @@ impl ScriptParameters {
 
     /// One that neither the script nor a deployment has read.
     pub(super) fn first_unread(&self) -> Option<String> {
-        let unread = self.given.iter().find(|(name, _)| !self.read.contains(name));
-        unread.filter(|_| !self.handed_on).map(|(name, _)| self.unread(name))
+        let may_be = |name: &String| self.handed_on && !self.own.contains(name);
+        let unread = self.given.iter().find(|(name, _)| !self.read.contains(name) && !may_be(name));
+        unread.map(|(name, _)| self.unread(name))
     }
 
     /// Of a refused deployment: one of ours that it does not read, and that the script may have been meant by.
@@ -53,6 +57,16 @@ impl ScriptParameters {
         });
         ours.filter(|_| unknown && !self.read.is_empty()).map(|(name, _)| self.unread(name))
     }
+}
+
+/// Whether a script's text has `param("NAME"` in it, however it is spelt.
+fn reads(text: &str, name: &str) -> bool {
+    text.match_indices("param").any(|(at, word)| {
+        let behind = text[at + word.len()..].trim_start();
+        let behind = behind.strip_prefix('(').unwrap_or(behind).trim_start();
+        let quoted = |quote: char| behind.strip_prefix(quote).and_then(|behind| behind.strip_prefix(name));
+        ['"', '\''].into_iter().any(|quote| quoted(quote).is_some_and(|behind| behind.starts_with(quote)))
+    })
 }
 
 pub(super) fn param(host: &SharedHost, lua: &Lua, name: &str, default: Value) -> mlua::Result<Value> {
