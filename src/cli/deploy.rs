@@ -230,7 +230,11 @@ fn watch(
             progress.finish();
         }
     };
-    SignalWatch::start(in_background, stop, leave).map_err(unwatched)
+    let held = {
+        let session = Arc::downgrade(session);
+        move || session.upgrade().is_some_and(|session| session.waits_to_be_forced())
+    };
+    SignalWatch::start(in_background, stop, held, leave).map_err(unwatched)
 }
 
 /// Signals cannot be watched.

@@ -58,6 +58,7 @@ pub fn run(context: &CommandContext) -> CommandResult {
             move |_| {
                 left(lock(&passed).signal());
             },
+            || false,
             leave,
         )
         .map_err(super::deploy::unwatched)?

@@ -73,12 +73,17 @@ impl Run for Args {
         };
         let interrupt = Interrupt::default();
         let watch = {
-            let (interrupt, stopped, left) = (interrupt.clone(), progress.clone(), progress.clone());
+            let (stopped, left) = (progress.clone(), progress.clone());
+            let stops = interrupt.clone();
             let stop = move |force| {
-                interrupt.stop(force);
+                stops.stop(force);
                 stopped.line(signals::told(force));
             };
-            SignalWatch::start(false, stop, move || left.finish()).map_err(super::deploy::unwatched)?
+            let held = {
+                let interrupt = interrupt.clone();
+                move || interrupt.waits_to_be_forced()
+            };
+            SignalWatch::start(false, stop, held, move || left.finish()).map_err(super::deploy::unwatched)?
         };
         let end = script::run(
             &self.script,
@@ -97,6 +102,11 @@ impl Run for Args {
         progress.finish();
         measured(context, &progress, &end);
         if let Some(ended) = &end.ended {
+            // Else the story has told it.
+            if self.quiet && !ended.is_orderly() {
+                let note = |note: &String| format!("{}  {note}", context.out.paint(Style::Care, "note"));
+                ended.forced.iter().for_each(|forced| progress.line(note(forced)));
+            }
             for note in &ended.left {
                 progress.line(format!("{}  {note}", context.out.paint(Style::Bad, "left")));
             }

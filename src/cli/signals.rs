@@ -41,7 +41,9 @@ impl SignalSeen {
     /// order; a key that is held down repeats. So a terminal that is gone, or a time limit, asks for no more than the first one
     /// has; what follows the first within [`limits::SIGNAL_REPEATS`] is the same; and only after a pause of
     /// [`limits::SIGNAL_HELD`] one asks for the end at once.
-    fn asks(&mut self, signal: i32, now: Time) -> Asks {
+    ///
+    /// `held`: stopping stands still until somebody asks for force. Then one more asks for that, and for no end at once.
+    fn asks(&mut self, signal: i32, now: Time, held: bool) -> Asks {
         let within = |of: Option<Time>, limit| of.is_some_and(|of| now.since(of) < limit);
         let same = match self.count {
             0 => false,
@@ -54,7 +56,7 @@ impl SignalSeen {
             return Asks::Nothing;
         }
         self.counted = Some(now);
-        self.count = (self.count + 1).min(3);
+        self.count = (self.count + 1).min(if held { 2 } else { 3 });
         match self.count {
             1 => Asks::Stop,
             2 => Asks::Force,
@@ -64,8 +66,8 @@ impl SignalSeen {
 }
 
 impl SignalWatch {
-    /// At the first signal calls `stop(false)`, at the second `stop(true)`: by force. The third is for when even that does not
-    /// come to an end: it calls `leave` and ends the process with [`Exit::Forced`]; nothing more is asked of the components, and
+    /// At the first signal calls `stop(false)`, at the second `stop(true)`: by force; and again at each that comes while it is `held`
+    /// until somebody asks for that. The third is for when even that does not come to an end: it calls `leave` and ends the process with [`Exit::Forced`]; nothing more is asked of the components, and
     /// what the process holds goes with it. With `detached` the end of the terminal (SIGHUP) is no signal. What whoever has
     /// started the process had it ignore (`nohup`, a shell without a terminal for what runs beside it) stays ignored.
     ///
@@ -74,6 +76,7 @@ impl SignalWatch {
     pub fn start(
         detached: bool,
         stop: impl Fn(bool) + Send + 'static,
+        held: impl Fn() -> bool + Send + 'static,
         leave: impl FnOnce() + Send + 'static,
     ) -> std::io::Result<Self> {
         [libc::SIGTTOU, libc::SIGTTIN].into_iter().for_each(ignore);
@@ -91,7 +94,7 @@ impl SignalWatch {
                 if signal == SIGHUP && detached {
                     continue;
                 }
-                match seen.asks(signal, clock.now()) {
+                match seen.asks(signal, clock.now(), held()) {
                     Asks::Nothing => {}
                     Asks::Stop => stop(false),
                     Asks::Force => stop(true),

@@ -13,7 +13,7 @@
 //! * `engine`: the thread. `requests`: batches begin and end. `running`: a transaction under way. `carry`: it and the
 //!   platform; `hands`: an immediate step. [`conditions`], `stands`: what only the values of components tell, and what is
 //!   watched while it is in force. `safe`, `safety`: what goes first. `fast`, `switches`: plans that are carried out again.
-//!   `taking_back`, `teardown`: the second and the third stage of stopping, to nothing. `recovery`: the way out of what is broken.
+//!   `taking_back`, `teardown`: the second and the third stage of stopping, to nothing; `resting`: what force applies before. `recovery`: the way out of what is broken.
 //!   `anew`: after a panic. `suspects`, `reported`: who was reported faulted. `confirmations`: frames that
 //!   wait to be confirmed. `observing`, `looks`: the slow look at what nothing is under way with.
 //!   `pool`, `inbox`: their tools.
@@ -38,6 +38,7 @@ mod repair;
 mod reported;
 pub mod request;
 mod requests;
+mod resting;
 mod running;
 mod safe;
 mod safety;

@@ -10,6 +10,7 @@ use super::engine::Engine;
 use super::repair::By;
 use super::request::{Reason, Request};
 use crate::model::{Ask, ConfigId, RequestId};
+use crate::stack::claims::is_of_system;
 use crate::stack::{Batch, Frame, FrameId, Inverse, LedDown, Op, Planned, Requester, Why, transaction};
 use crate::system::step;
 use crate::time::Time;
@@ -94,7 +95,7 @@ impl Engine {
         }
         self.see_left(&mut down);
         down.quarantined.clone_from(&self.world.quarantined);
-        down.held = self.is_held();
+        down.held = self.is_held(None);
         down.still = self.world.stack.safe().next().is_some();
         down.in_time = self.given.clock.now() <= deadline;
         self.taking_down = false;
@@ -108,10 +109,11 @@ impl Engine {
         self.began.as_mut().map_or(next, |began| *began.led.get_or_insert(next))
     }
 
-    /// Whether a safe configuration was in force before stopping began, and nobody let it go.
-    pub(super) fn is_held(&self) -> bool {
-        let before = |frame: &Arc<Frame>| frame.safe && !self.came_since(frame);
-        self.world.stack.frames().iter().any(before)
+    /// Whether a safe configuration was in force before stopping began, or is where it has not begun, and nobody let it go; `of`: one in
+    /// whose (sub)system that is.
+    pub(super) fn is_held(&self, of: Option<ConfigId>) -> bool {
+        let about = |frame: &Frame| of.is_none_or(|of| is_of_system(frame.configuration, of));
+        self.world.stack.frames().iter().any(|frame| frame.safe && !self.came_since(frame) && about(frame))
     }
 
     /// This moment.

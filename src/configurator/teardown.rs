@@ -2,12 +2,13 @@
 
 use super::control::{InTurn, TakenDown};
 use super::engine::{Engine, Force};
-use super::request::{Reason, Request};
+use super::request::Reason;
 use super::running::{Purpose, Running};
 use crate::limits;
 use crate::model::{ConfigId, Origin, RequestId, Step};
 use crate::plan::{PlanStage, PlannedStep};
-use crate::stack::{BestEffort, Broken, FrameId, Part, Planned, Requester, Residual, Why, effort};
+use crate::stack::claims::is_of_system;
+use crate::stack::{Broken, Frame, FrameId, Part, Planned, Residual, Why};
 use crate::system::{self, Reversibility, System, Undo};
 use crate::time::Time;
 use crate::transaction::{Input, Limit, Spec, Transaction};
@@ -69,21 +70,13 @@ impl Engine {
         self.break_off();
         let (led, since) = (self.nobody_leads(), self.world.stack.next());
         let Force { safe, rest } = self.given.force.clone();
-        // What a safe configuration held still before stopping began is not moved any more.
-        let held = match self.began {
-            Some(_) => self.is_held(),
-            None => self.world.stack.safe().next().is_some(),
-        };
-        self.apply_all(&safe, None, &mut down);
-        if !held {
-            self.apply_all(&rest, Some(led), &mut down);
-            down.rest = rest;
-        }
+        self.make_all_safe(&safe, &mut down);
+        down.rest = self.bring_to_rest(&rest, led, &mut down);
         down.safe = safe;
         self.end_running();
         self.refuse_waiting();
         // An emergency meanwhile: nothing is taken away from under what it holds, before somebody asks once more.
-        if self.became_safe(since) {
+        if self.became_safe(since, None) {
             self.see_left(&mut down);
             down.still = true;
             down.in_time = self.given.clock.now() <= deadline;
@@ -154,54 +147,10 @@ impl Engine {
         }
     }
 
-    /// Whether a safe configuration has come since this frame would have been the next.
-    fn became_safe(&self, since: FrameId) -> bool {
-        self.world.stack.frames().iter().any(|frame| frame.safe && frame.id >= since)
-    }
-
-    /// Applies these as far as they go, one after the other; no quarantine keeps what is safe out. `led`: they bring it to
-    /// rest, and what of that fails is tried again, as often as something is removed again; what moves is done where no safe configuration is in force, or where somebody has asked for force and none has come
-    /// since nobody leads.
-    fn apply_all(&mut self, ids: &[ConfigId], led: Option<FrameId>, down: &mut TakenDown) {
-        let safe = led.is_none();
-        let configurations = self.given.configurations.clone();
-        for id in ids {
-            let Some(configuration) = configurations.get(id) else { continue };
-            let request = Request::new(RequestId(0), crate::model::Ask::Apply(*id), Requester::Operator);
-            let at = self.given.clock.now();
-            let BestEffort { mut planned, troubles: left_out, .. } =
-                effort(&self.world.system, &self.world.stack, configuration, &request, at, &self.given.context);
-            // What brings it to rest may take the time that it gives itself.
-            let patience = self.patience([*id]);
-            let (mut whole, mut troubles) = (false, Vec::new());
-            for _ in 0..limits::FORCE_ROUNDS {
-                // A safe configuration that somebody asked for keeps everything still.
-                let asked = self.is_hurried() && led.is_some_and(|led| !self.became_safe(led));
-                if !safe
-                    && !asked
-                    && self.world.stack.safe().next().is_some()
-                    && let Some(moving) = planned.steps.iter().find(|planned| planned.moves)
-                {
-                    troubles.push(Reason::Moves(moving.step.clone()));
-                    break;
-                }
-                let steps = planned.steps.len();
-                let machine = Transaction::new(planned, self.effort([*id]));
-                let done = if safe { self.carry_out_safe(machine) } else { self.carry_out(machine) };
-                whole = done.done_so_far().count() == steps;
-                let failed: Vec<PlannedStep> = done.failed_steps().cloned().collect();
-                troubles = troubles_of(done);
-                // Not what nobody knows of: it may be moving.
-                if safe || failed.is_empty() || self.given.clock.now() >= at + patience {
-                    break;
-                }
-                planned = own_plan(one_by_one(failed), &self.world.system);
-            }
-            if !whole || !troubles.is_empty() || !left_out.is_empty() {
-                down.partly.push(*id);
-            }
-            down.troubles.extend(left_out.into_iter().chain(troubles));
-        }
+    /// Whether a safe configuration has come since this frame would have been the next; `of`: one in whose (sub)system that is.
+    pub(super) fn became_safe(&self, since: FrameId, of: Option<ConfigId>) -> bool {
+        let about = |frame: &Frame| of.is_none_or(|of| is_of_system(frame.configuration, of));
+        self.world.stack.frames().iter().any(|frame| frame.safe && frame.id >= since && about(frame))
     }
 
     /// Carries something of one's own out, while everything else goes on.
@@ -219,14 +168,6 @@ impl Engine {
             SmallVec::from_iter([request]),
             self.world.stack.next(),
         ));
-        self.complete(number).machine
-    }
-
-    /// The same with what quarantine does not keep out.
-    fn carry_out_safe(&mut self, machine: Transaction) -> Transaction {
-        let number = self.number();
-        let running = Running::new(number, machine, Purpose::Own, SmallVec::new(), self.world.stack.next());
-        self.running.push(Running { enters_quarantine: true, ..running });
         self.complete(number).machine
     }
 
@@ -274,14 +215,6 @@ impl Engine {
         self.see_left(down);
         down.quarantined.clone_from(&self.world.quarantined);
     }
-}
-
-/// Steps one after the other.
-fn one_by_one(mut steps: Vec<PlannedStep>) -> Vec<PlannedStep> {
-    for (id, step) in (0u32..).zip(&mut steps) {
-        (step.id, step.wave, step.after) = (id, 0, id.checked_sub(1).into_iter().collect());
-    }
-    steps
 }
 
 /// What a best effort could not do.

@@ -1,7 +1,7 @@
 //! A deployment with its subsystems (semantics: *Composition*): who is where.
 
 use super::deployment::{Coordinator, Deployment, Subsystem};
-use super::names::{EventName, Ident};
+use super::names::{ConfigId, EventName, Ident};
 use super::subsystem::{IGNORED, SubsystemStanding};
 use super::within::Within;
 
@@ -15,6 +15,15 @@ impl Deployment {
             all.extend(inner.into_iter().map(|(path, inner)| (path.within(subsystem.name), inner)));
         }
         all
+    }
+
+    /// What brings the whole to rest when it is taken down by force: what its own file names for that, and what those of its subsystems do.
+    pub fn all_rest(&self) -> Vec<ConfigId> {
+        let own = self.shutdown.rest.iter().map(|(id, _)| *id);
+        let inside = self.all_subsystems().into_iter().flat_map(|(path, subsystem)| {
+            subsystem.own.shutdown.rest.iter().map(move |(id, _)| id.within(path)).collect::<Vec<_>>()
+        });
+        own.chain(inside).collect()
     }
 
     /// The subsystem of that path.

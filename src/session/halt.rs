@@ -25,7 +25,7 @@ pub struct StoppingView {
 impl StoppingView {
     /// Why nothing goes on before somebody decides; none: it goes on.
     pub fn stands_still(&self) -> Option<String> {
-        let held = "a safe configuration holds what is left: `davit shutdown --force` lets go";
+        let held = "a safe configuration holds what is left: `davit shutdown --force`, or a signal, lets go";
         self.stands_still.as_ref().map(ToString::to_string).or_else(|| self.held.then(|| held.to_owned()))
     }
 }
@@ -110,6 +110,11 @@ impl StoppingState {
 
     pub fn hold(&self, held: bool) {
         lock(&self.state).held = held;
+    }
+
+    /// Whether what is left is held until somebody asks for force.
+    pub fn is_held(&self) -> bool {
+        lock(&self.state).held
     }
 
     /// Whether a coordinator still leads down.

@@ -124,7 +124,12 @@ impl Session {
         self.configurator().event(event);
         self.junction().tell_leaving(self.configurator(), event);
         let acted = make_safe(self.hub(), self.configurator(), event, Class::Outside);
-        (held.len()..self.parts().len()).for_each(|_| self.hub().taken_up(ticket, false));
+        // One of safety is given on to every subsystem that has it: whether it was heard is said there as well.
+        let inside: Vec<(EventName, Option<Ident>)> = subsystems.map_or(Vec::new(), |subsystems| {
+            subsystems.given_on(event).iter().map(|event| (*event, subsystems.path_of(*event))).collect()
+        });
+        let given_on: usize = inside.iter().map(|(_, path)| self.junction().in_file(*path).len()).sum();
+        (held.len() + given_on..self.parts().len()).for_each(|_| self.hub().taken_up(ticket, false));
         let (mut unwatched, mut missed) = (false, 0);
         {
             let _giving = self.junction().giving();
@@ -143,10 +148,9 @@ impl Session {
             self.hub()
                 .note(Happening::Forced { note: format!("`{event}` was not delivered: the coordinator is gone") });
         }
-        // One of safety is given on to every subsystem that has it.
-        for event in subsystems.map_or(&[][..], |subsystems| subsystems.given_on(event)) {
-            let path = subsystems.and_then(|subsystems| subsystems.path_of(*event));
-            self.junction().give_to(self.hub(), path, self.junction().incoming(Class::Outside, *event));
+        for (event, path) in inside {
+            let incoming = self.junction().incoming(Class::Outside, event).watched(ticket);
+            self.junction().give_to(self.hub(), path, incoming);
         }
         if unwatched { Err(NotAccepted::Full.into()) } else { Ok(acted) }
     }

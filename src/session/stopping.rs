@@ -7,7 +7,7 @@ use super::stages::{Came, NextStage, Stage, first, next};
 use super::{Command, Session, Unanswered};
 use crate::configurator::{FrameView, TakenDown};
 use crate::limits;
-use crate::model::{ConfigId, EventName, Origin, Step};
+use crate::model::{ConfigId, EventName, Step};
 use crate::statechart::{EventId, NodeId};
 use crate::time::{Receiver, Time};
 use std::sync::atomic::Ordering;
@@ -97,7 +97,9 @@ impl Session {
                 }
                 NextStage::Held => {
                     let what = self.what_holds(held);
-                    let note = format!("{what}: what is left stays as it is until a second signal or `--force`");
+                    let note = format!(
+                        "{what}: what is left stays as it is until a signal (Ctrl-C) or `davit shutdown --force` asks for force anew"
+                    );
                     hub.note(Happening::Forced { note });
                     hub.halt().hold(true);
                     self.wait_for_force();
@@ -254,9 +256,10 @@ impl Session {
     /// The third stage.
     fn force_all(&self, told: &mut Announced) -> (Came, HeldUp) {
         // What brings it to rest takes nothing of the time in which everything is removed.
-        let rest = |(id, _): &(ConfigId, Origin)| self.deployment().configuration(*id).and_then(|c| c.timeout);
+        let rest = |id: ConfigId| self.deployment().configuration(id).and_then(|c| c.timeout);
         let step = self.deployment().limits.step_timeout;
-        let rest: Duration = self.deployment().shutdown.rest.iter().map(|of| rest(of).unwrap_or(step).max(step)).sum();
+        let rest: Duration =
+            self.deployment().all_rest().into_iter().map(|id| rest(id).unwrap_or(step).max(step)).sum();
         let within = self.deployment().shutdown.within + rest;
         let deadline = self.clock().now() + within;
         let Some(down) = self.stage_of(self.configurator().force_down(deadline), deadline) else {

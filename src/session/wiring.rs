@@ -90,7 +90,7 @@ impl Session {
             super::stands::needed(&deployment, &catalogue).then(|| Evaluator::start(&clock, &platform, &junction));
         let configurator = Configurator::start(ConfiguratorSetup {
             configurations: deployment.configurations.clone(),
-            rest: deployment.shutdown.rest.iter().map(|(id, _)| *id).collect(),
+            rest: deployment.all_rest(),
             operator: deployment.operator_applies().collect(),
             catalogue,
             activities: deployment.activities.keys().copied().collect(),
@@ -242,6 +242,11 @@ impl Session {
     /// the other is asked to end, and not only this one.
     pub fn flag_commands(&self, flag: &Arc<AtomicBool>) {
         *lock(&self.commanded) = Some(flag.clone());
+    }
+
+    /// Whether stopping stands still, and goes on when somebody asks for force.
+    pub fn waits_to_be_forced(&self) -> bool {
+        self.hub.halt().is_held()
     }
 
     /// Leaves a command for whoever drives the session. Where it is being stopped already, to shut down raises the event

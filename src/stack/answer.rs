@@ -2,6 +2,7 @@
 
 use super::request::Request;
 use crate::model::codes;
+use crate::model::finding::count;
 use crate::model::{Cause, ComponentName, ConfigId, EventName, Finding, Findings, Step, Verdict};
 use crate::system::{System, UnknownType, step};
 use crate::time::Time;
@@ -99,6 +100,12 @@ pub enum Reason {
     UnknownType(UnknownType),
     /// No frame to undo.
     NothingToUndo,
+    /// No frame of an operator to undo; coordinators have some.
+    NoneByHand,
+    /// No frame above so many.
+    NothingAbove(usize),
+    /// It was to be undone, and had no frame.
+    NotInForce(ConfigId),
     /// It was undone, and these frames of operators with it, which stood in its way.
     TookAlong(Vec<ConfigId>),
     /// Everything is being taken down.
@@ -246,9 +253,10 @@ impl Reason {
                 .help("`davit check` follows what comes of what is listed, applied at any time"),
             Self::NotConfirmed(..) => Finding::error(codes::NOT_CONFIRMED, self.to_string())
                 .help("find out why the event did not come, or give it more time with `within`"),
-            Self::NothingToUndo => {
+            Self::NothingToUndo | Self::NoneByHand | Self::NothingAbove(_) => {
                 Finding::error(codes::NOTHING_TO_UNDO, self.to_string()).help("`davit stack` shows the frames in force")
             }
+            Self::NotInForce(_) => Finding::info(codes::NOTHING_TO_UNDO, self.to_string()),
             Self::TookAlong(_) => Finding::info(codes::STACK_TAKEN_ALONG, self.to_string()),
             Self::TakenDown | Self::Ended => {
                 Finding::error(codes::ENDED, self.to_string()).help("deploy again before asking for configurations")
@@ -288,7 +296,9 @@ impl fmt::Display for Reason {
             Self::Moves(step) => write!(f, "`{step}` moves, and a safe configuration is in force"),
             Self::MovesUnasked(step) => write!(f, "`{step}` moves, and nobody asked for that"),
             Self::Busy => f.write_str("requests are under way that it would meddle with"),
-            Self::NeedsForce(id) => write!(f, "`{id}` is a frame of a coordinator"),
+            Self::NeedsForce(id) => {
+                write!(f, "`{id}` is a frame of a coordinator: `--force` undoes it all the same (in a script `{{force = true}}`)")
+            }
             Self::NotListed(id) => write!(
                 f,
                 "the deployment's `operator:` does not list `{id}`: add it there, or say `--force` (in a script `{{force = true}}`)"
@@ -301,6 +311,12 @@ impl fmt::Display for Reason {
             Self::Panic(text) => write!(f, "the configurator itself failed: {text}"),
             Self::UnknownType(unknown) => write!(f, "what the platform shows was not taken in: {unknown}"),
             Self::NothingToUndo => f.write_str("there is no frame to undo"),
+            Self::NoneByHand => f.write_str(
+                "nothing that was applied by hand is in force: a coordinator's frame is undone by its name, with `--force` (in a script \
+                 `{force = true}`)",
+            ),
+            Self::NothingAbove(left) => write!(f, "there is nothing to undo: no more is in force than {}", count(left, "frame")),
+            Self::NotInForce(id) => write!(f, "`{id}` was not in force: there was nothing to undo"),
             Self::TookAlong(ids) => {
                 let ids: Vec<String> = ids.iter().map(|id| format!("`{id}`")).collect();
                 write!(f, "{} of an operator was undone with it, since it stood in its way", ids.join(", "))

@@ -316,7 +316,11 @@ fn resolve<'a>(
                 {
                     tell(failed, Reason::NeedsForce(id))
                 }
-                None => ResolvedRequest::Tell(Some(Verdict::Undone), None),
+                None => {
+                    // A coordinator leaves a state whose configuration has failed; a person takes *undone* for something done.
+                    let person = request.requester == Requester::Operator && request.why == Why::Asked;
+                    ResolvedRequest::Tell(Some(Verdict::Undone), person.then_some(Reason::NotInForce(id)))
+                }
             }
         }
         Ask::Undo => match work.frames.iter().rev().find(|frame| frame.requester == request.requester) {
@@ -324,6 +328,9 @@ fn resolve<'a>(
                 Some(reason) if !frame.safe => tell(failed, reason),
                 _ => ResolvedRequest::Op(Op::Undo(frame.id)),
             },
+            None if request.requester == Requester::Operator && !work.frames.is_empty() => {
+                tell(failed, Reason::NoneByHand)
+            }
             None => tell(failed, Reason::NothingToUndo),
         },
         Ask::UndoTo(left) => {
@@ -331,7 +338,7 @@ fn resolve<'a>(
                 return tell(failed, Reason::StillBroken(broken.residual.clone()));
             }
             match work.frames.get(left..) {
-                None | Some([]) => tell(failed, Reason::NothingToUndo),
+                None | Some([]) => tell(failed, Reason::NothingAbove(work.frames.len())),
                 Some(above) => match foreign(above, request) {
                     Some(id) => tell(failed, Reason::NeedsForce(id)),
                     None => ResolvedRequest::Op(Op::UndoTo(left)),

@@ -222,6 +222,14 @@ fn a_coordinators_frame_is_undone_by_force_only() {
     let forced = run(&["undo", "thin", "--force", "--wait"]);
     assert_eq!(forced.code, 0, "{}{}", forced.out, forced.err);
     assert_ne!(every(), 5);
+    // What a person asks for, and is not there to be undone, is told as that.
+    let nothing = |args: &[&str], code: i32, says: &str| {
+        let ran = run(args);
+        assert!(ran.code == code && ran.out.contains(says), "{args:?}: {}{}", ran.out, ran.err);
+    };
+    nothing(&["undo", "thick"], 0, "`thick` was not in force: there was nothing to undo");
+    nothing(&["undo"], 1, "a coordinator's frame is undone by its name, with `--force`");
+    nothing(&["undo", "--to", "9"], 1, "no more is in force than 1 frame");
     assert_eq!(run(&["shutdown"]).code, 0);
 }
 

@@ -288,6 +288,43 @@ fn what_stands_still_after_an_emergency_says_what_it_waits_for() {
     assert_eq!(deployed.end().code(), Some(0), "{}", demo.read("out"));
 }
 
+/// Two signals have asked for force, and since an emergency that waits for people: one more asks for it anew, and ends nothing at once.
+#[test]
+fn where_force_waits_for_people_one_more_signal_asks_for_it() {
+    let demo = with_an_emergency("e_stop");
+    demo.replace("deployment.yaml", "within_s: 600 }", "within_s: 600, rest: [rest] }");
+    demo.replace(
+        "deployment.yaml",
+        "platform: simulated",
+        "platform: simulated\nfaults: [{ step: operation_call, how: slow, takes_s: 3 }]",
+    );
+    demo.replace(
+        "deployment.yaml",
+        "  T: { properties",
+        "  T: { operations: { lower: { moves: true, effect: irreversible } }, properties",
+    );
+    demo.replace("deployment.yaml", "safety:", "limits: { step_timeout_s: 30 }\nsafety:");
+    demo.replace(
+        "configurations.lua",
+        "fast =",
+        "rest = Configuration { irreversible = true, operation_call(\"a.lower\") }, fast =",
+    );
+    let deployed = deploy(&demo, "out");
+    demo.until_phase("up");
+    deployed.signal(libc::SIGINT);
+    demo.until_phase("shutting_down");
+    deployed.signal_again(libc::SIGINT);
+    let stopping = || demo.run(&["status", "--json"]).json()["stopping"].clone();
+    until("it is forced", || (stopping()["stage"] == "forced").then_some(()));
+    assert_eq!(demo.run(&["event", "e_estop"]).code, 0);
+    until("it waits for people", || (stopping()["held"] == true).then_some(()));
+    deployed.signal_again(libc::SIGINT);
+    assert_eq!(deployed.end().code(), Some(4));
+    let told = demo.read("out");
+    assert!(told.contains("until a signal (Ctrl-C) or `davit shutdown --force` asks for force anew"), "{told}");
+    assert!(told.contains("small down by force, nothing is left"), "{told}");
+}
+
 /// A command ends after its `--within`: with the deployment's word where that lives, and what it says is not that nobody answers.
 #[test]
 fn who_waits_for_less_than_it_takes_is_told_so() {
@@ -349,6 +386,13 @@ fn the_end_of_a_script_leaves_what_is_safe_and_says_so() {
         assert_eq!(ran.code, 4, "{}{}", ran.out, ran.err);
         ran.out + &ran.err
     };
+    let quiet = |script: &str| {
+        let demo = with_an_emergency("e_estop");
+        demo.write("story.lua", script);
+        demo.run(&["run", "story.lua", "--clock", "simulated", "--quiet"])
+    };
+    let removed = quiet("deploy('deployment.yaml')");
+    assert!(removed.code == 4 && removed.out.contains("`base` undone"), "{}{}", removed.out, removed.err);
     let held = ends("deploy('deployment.yaml') raise('e_estop') wait_state('root.safe', 5)");
     let removed = ends("deploy('deployment.yaml')");
     assert!(held.contains("what is left stays as it is") && held.contains("left  a (running)"), "{held}");

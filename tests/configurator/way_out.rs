@@ -405,12 +405,7 @@ fn there_is_a_way_out_of_what_was_found() {
         (vec![(Act::Apply(0), 0), (Act::Trap(4), 0), (apply("tune"), 0), (Act::Apply(0), 0)], vec![]),
         // What is half undone of a safe configuration, and a panic has broken off, is mended with the rest of its undo.
         (
-            vec![
-                (safe("brake"), 1),
-                (Act::Trap(10), 0),
-                (safe("rest"), 0),
-                (Act::UndoSafe(place(&SAFE, "brake")), 0),
-            ],
+            vec![(safe("brake"), 1), (Act::Trap(10), 0), (safe("rest"), 0), (Act::UndoSafe(place(&SAFE, "brake")), 0)],
             vec![on("start C", lie)],
         ),
     ];

@@ -416,6 +416,10 @@ fn an_emergency_while_it_is_forced_waits_for_people() {
     assert!((30.0..32.0).contains(&took), "{took}: {ended:?}");
     let calls = small.steps().iter().filter(|step| step.contains("a.lower")).count();
     assert_eq!(calls, 1, "nothing moves any more: {:?}", small.heard.lock().unwrap());
+    // What was broken off has not come to rest, and nobody is told that it has.
+    let told = |words: &str| ended.forced.iter().filter(|note| note.contains(words)).count();
+    assert!(told("to come to rest, applied as far as it went") > 0 && told("interrupted by") > 0, "{ended:?}");
+    assert!(!ended.forced.iter().any(|note| note.ends_with("to come to rest, applied")), "{ended:?}");
     small.is_empty();
 }
 

@@ -100,9 +100,10 @@ fn what_one_does_delays_nothing_of_the_other() {
         both.wait(0.0);
         both.wait_for(&["left:five_DOF_mode"], 0.002);
         assert!(both.is("right:eight_DOF_mode"));
-        both.raise("e_estop");
+        let offered = both.session.offer_watched(EventName::new("e_estop").unwrap(), "operator").unwrap();
         both.wait(0.01);
         assert!(both.is("left:fault") && both.is("right:fault"), "an emergency stop is for both");
+        assert_eq!(both.session.hub().was_heard(offered.ticket), Some(true), "who sends it is told so");
         both.raise("left/e_reset");
         both.wait(0.5);
         assert!(both.is("left:operational") && both.is("right:fault"), "{:?}", both.session.hub().active());

@@ -35,6 +35,12 @@ impl Interrupt {
         }
     }
 
+    /// Whether what it brought up is being stopped, and that stands still until somebody asks for force.
+    pub fn waits_to_be_forced(&self) -> bool {
+        let session = lock(&self.state).session.upgrade();
+        session.is_some_and(|session| session.waits_to_be_forced())
+    }
+
     /// A deployment of the script's: commands go to it from now on, also one that came before.
     pub(super) fn up(&self, session: &Arc<Session>) {
         // Also who asks the deployment to end (`davit shutdown`) ends the script: whatever it catches, and whatever it would do next.

@@ -7,7 +7,17 @@ use std::time::Duration;
 fn asked(signals: &[(u64, i32)]) -> Vec<Asks> {
     let mut seen = SignalSeen::default();
     let at = |ms: u64| Time(0) + Duration::from_millis(ms);
-    signals.iter().map(|(ms, signal)| seen.asks(*signal, at(*ms))).collect()
+    signals.iter().map(|(ms, signal)| seen.asks(*signal, at(*ms), false)).collect()
+}
+
+/// After an emergency stopping stands still until somebody asks for force: who does so by a signal does not end the process.
+#[test]
+fn where_force_is_waited_for_a_signal_asks_for_it() {
+    let mut seen = SignalSeen::default();
+    let mut asks = |ms: u64, held| seen.asks(SIGINT, Time(0) + Duration::from_millis(ms), held);
+    assert_eq!([asks(0, false), asks(1000, false)], [Asks::Stop, Asks::Force]);
+    assert_eq!([asks(3000, true), asks(5000, true)], [Asks::Force, Asks::Force]);
+    assert_eq!(asks(7000, false), Asks::Leave);
 }
 
 #[test]
