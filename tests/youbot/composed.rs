@@ -4,7 +4,7 @@ use davit::app;
 use davit::lang::LoadOptions;
 use davit::libraries;
 use davit::model::EventName;
-use davit::session::{Happening, Session};
+use davit::session::{Happening, Session, Stage};
 use davit::time::{Clock, Time};
 use std::path::Path;
 use std::sync::{Arc, Mutex};
@@ -31,8 +31,10 @@ fn up<T>(file: &str, with: impl FnOnce(&Up) -> T) -> T {
     session.bring_up().unwrap();
     let up = Up { clock: clock.clone(), session, heard };
     let result = with(&up);
-    let ended = up.session.take_down(false);
-    assert!(ended.is_orderly(), "{ended:?}");
+    if up.session.ended().is_none() {
+        let ended = up.session.take_down(false);
+        assert!(ended.is_orderly(), "{ended:?}");
+    }
     result
 }
 
@@ -55,6 +57,15 @@ impl Up {
 
     fn is(&self, state: &str) -> bool {
         self.session.in_state(state)
+    }
+
+    /// Whose arm fell, or came down without power.
+    fn fallen(&self) -> Vec<String> {
+        let fell = |event: &String| event.ends_with("e_arm_dropped") || event.ends_with("e_arm_fell");
+        // What lasts is told again.
+        let all: std::collections::BTreeSet<String> =
+            self.events().into_iter().map(|(_, event)| event).filter(fell).collect();
+        all.into_iter().collect()
     }
 
     /// Events that were heard, with when.
@@ -125,5 +136,36 @@ fn each_is_told_of_once_and_only_its_parent_hears() {
         let joined = both.state_since("pair:root.alive.joined").unwrap();
         let last = both.events().iter().filter(|(_, event)| event.ends_with("/up")).map(|(at, _)| *at).max().unwrap();
         assert!(joined >= last);
+    });
+}
+
+/// Force lowers the arms of both before it takes anything away, side by side: what each robot's file names for that.
+#[test]
+fn force_lowers_both_arms() {
+    up("youbot_coupling.yaml", |both| {
+        both.wait_for(&["left:copying", "right:copying"], 20.0);
+        let began = both.clock.now();
+        let ended = both.session.take_down(true);
+        let took = seconds(both.clock.now()) - seconds(began);
+        assert!(ended.is_clean() && ended.stage == Stage::Forced, "{ended:?}");
+        assert!(took < 6.0, "side by side: {took} s");
+        let rests = |note: &&String| note.ends_with("to come to rest, applied");
+        assert_eq!(ended.forced.iter().filter(rests).count(), 4, "{ended:?}");
+        assert_eq!(both.fallen(), [""; 0]);
+    });
+}
+
+/// What stands still after an emergency is moved by nobody; the other robot's arm is lowered all the same.
+#[test]
+fn force_lowers_the_arm_of_who_is_not_held() {
+    up("youbot_coupling.yaml", |both| {
+        both.wait_for(&["left:copying", "right:copying"], 20.0);
+        both.raise("left/e_estop");
+        both.wait(0.5);
+        assert!(both.is("left:fault") && !both.is("right:fault"), "{:?}", both.session.hub().active());
+        let ended = both.session.take_down(true);
+        assert!(ended.is_clean() && ended.stage == Stage::Forced, "{ended:?}");
+        assert_eq!(both.fallen(), ["left/e_arm_dropped"], "support the arm of who was stopped: {ended:?}");
+        assert!(!ended.forced.iter().any(|note| note.contains("`left/park`")), "{ended:?}");
     });
 }
