@@ -14,6 +14,7 @@ use super::simulated;
 use super::trace::{Does, TraceStep};
 use super::universe::Universe;
 use super::verdict::CheckVerdict;
+use super::ways;
 use crate::model::MemberClass;
 use crate::model::{
     Catalogue, Change, ChangeKind, ComponentName, ComponentType, ConfigId, Configuration, Deployment, Finding, Ident,
@@ -68,6 +69,14 @@ where
     for finding in simulated::faults(whole.own_part(), &whole, &Universe::new(&whole, catalogue)) {
         report.findings.push(finding);
         report.traces.push(Vec::new());
+    }
+    // Files that lead up and down each by itself may not do so together. Of a subsystem that is asked with the whole.
+    let sound = reports.iter().map(|(_, of)| of).chain([&report]).all(|of| of.verdict != CheckVerdict::Refused);
+    if sound && around.parent.is_none() {
+        for (finding, way) in ways::together(&whole, catalogue) {
+            report.findings.push(finding);
+            report.traces.push(way);
+        }
     }
     reports.push((Vec::new(), report));
     (put_together(whole, reports), shows)

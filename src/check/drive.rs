@@ -325,9 +325,7 @@ pub fn drive(deployment: &Deployment, catalogue: &Catalogue, until: Until) -> Op
     let charts: Option<Vec<Chart>> = deployment.charts().map(|chart| crate::statechart::compile(chart).0).collect();
     let charts = charts?;
     let charts: Vec<&Chart> = charts.iter().collect();
-    let numbers: Vec<usize> = (0..charts.len()).collect();
-    let views: Vec<Deployment> = numbers.iter().filter_map(|n| coupling::view(deployment, &charts, *n)).collect();
-    let mut product = Product::new(deployment, &views, &charts, &numbers, catalogue);
+    let mut product = Product::of_all(deployment, &charts, catalogue);
     product.operator.clear();
     let (rise, fall) = ways(&mut product)?;
     let end = match (until, &fall) {

@@ -179,6 +179,14 @@ impl<'a> Product<'a> {
         product
     }
 
+    /// The product of all coordinators of a deployment, those of its subsystems too.
+    pub fn of_all(deployment: &'a Deployment, charts: &[&'a Chart], catalogue: &Catalogue) -> Self {
+        let numbers: Vec<usize> = (0..charts.len()).collect();
+        let views: Vec<Deployment> =
+            numbers.iter().filter_map(|number| coupling::view(deployment, charts, *number)).collect();
+        Self::new(deployment, &views, charts, &numbers, catalogue)
+    }
+
     /// So much of it is followed.
     pub fn follow_with(&mut self, effort: Effort<'a>) {
         self.effort = effort.into();

@@ -9,8 +9,8 @@ use super::timers::Timer;
 use super::trace::TraceStep;
 use super::tried::Way;
 use crate::model::codes::{DEPLOY_LEFTOVERS, DEPLOY_NEVER_DOWN, DEPLOY_NEVER_UP, STACK_SQUASHED};
-use crate::model::{Code, Coordinator, Finding, Origin, Severity};
-use crate::statechart::NodeId;
+use crate::model::{Catalogue, Code, Coordinator, Deployment, Finding, Origin, Severity};
+use crate::statechart::{Chart, NodeId};
 
 /// What is wrong with the bring-up and the shutdown, with the ways to it from the start.
 pub fn ways(product: &mut Product<'_>) -> Traced {
@@ -56,6 +56,15 @@ pub fn ways(product: &mut Product<'_>) -> Traced {
         }
     }
     found
+}
+
+/// The same of a deployment and all of its subsystems, which go up and down as one.
+pub fn together(whole: &Deployment, catalogue: &Catalogue) -> Traced {
+    let charts: Option<Vec<Chart>> = whole.charts().map(|chart| crate::statechart::compile(chart).0).collect();
+    // What functions raise is not known.
+    let Some(charts) = charts.filter(|charts| charts.iter().all(Chart::is_pure)) else { return Traced::new() };
+    let charts: Vec<&Chart> = charts.iter().collect();
+    ways(&mut Product::of_all(whole, &charts, catalogue))
 }
 
 /// The ways one after the other, as a trace from the start.

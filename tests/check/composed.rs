@@ -529,3 +529,30 @@ fn eight_take_no_more_than_four_times_what_two_take() {
     assert!(eight < 4 * two, "{two} {eight}");
     assert_eq!(nine - eight, (eight - two) / 6, "each takes the same");
 }
+
+/// Files that lead down each by itself, and not together: all of them are driven up and down as one, too.
+#[test]
+fn files_that_do_not_come_down_together_are_refused() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/pair");
+    let names = ["configurations.lua", "coordinator.lua"].map(|part| [format!("pair_{part}"), format!("robot_{part}")]);
+    let names = names.into_iter().flatten().chain(["pair.yaml".to_owned(), "robot.yaml".to_owned()]);
+    let shipped: Vec<(String, String)> =
+        names.map(|name| (name.clone(), std::fs::read_to_string(folder.join(name)).unwrap())).collect();
+    let errors = |files: Vec<(String, String)>| -> Vec<(String, usize)> {
+        let files: Vec<(&str, &str)> = files.iter().map(|(name, text)| (name.as_str(), text.as_str())).collect();
+        let deployment = load(&Sources::memory(files), "pair.yaml", &[]).deployment.unwrap();
+        let catalogue = catalogue(&deployment);
+        let report = check::run(deployment, &catalogue);
+        let found = report.findings.iter().zip(&report.traces).filter(|(finding, _)| finding.is_error());
+        found.map(|(finding, trace)| (finding.code.to_string(), trace.len())).collect()
+    };
+    assert_eq!(errors(shipped.clone()), []);
+    let mut reordered = shipped;
+    for (_, text) in &mut reordered {
+        let both = r#""left/e_shutdown", "right/e_shutdown", "left/e_released", "right/e_released""#;
+        let other = r#""left/e_released", "right/e_released", "left/e_shutdown", "right/e_shutdown""#;
+        *text = text.replace(both, other);
+    }
+    let found = errors(reordered);
+    assert!(matches!(&found[..], [(code, trace)] if code == "deploy::never_down" && *trace > 1), "{found:?}");
+}
