@@ -252,7 +252,8 @@ fn a_missing_library_and_a_missing_file_are_named() {
     demo.replace("deployment.yaml", "types:\n", "libraries: [youbt]\ntypes:\n");
     let json = demo.run(&["check", "deployment.yaml", "--json"]).json();
     assert_eq!(json["findings"][0]["code"], "deploy::unknown_library");
-    assert!(json["findings"][0]["help"].as_str().unwrap().contains("`youbot`"));
+    let help = json["findings"][0]["help"].as_str().unwrap();
+    assert!(help.contains("`youbot`") && help.contains("a program of one's own"), "{help}");
     let demo = Demo::new();
     let line = demo.replace("deployment.yaml", "[configurations.lua]", "[configuration.lua]");
     let ran = demo.run(&["check", "deployment.yaml", "--json"]);
@@ -274,5 +275,16 @@ fn of_a_file_that_is_not_there_it_is_said_which_are() {
     demo.write("empty/deployments/arm.yaml", "");
     let below = "in the folder empty/deployments: known files: `arm.yaml`";
     assert_eq!(help(&["check", "empty/nope.yaml", "--json"]), below);
+    assert_eq!(
+        help(&["check", "empty/deployments", "--json"]),
+        "name a file in it, such as `empty/deployments/arm.yaml`"
+    );
+    // A file of another kind is told so by every command.
+    let drawn = demo.run(&["graph", "configurations.lua"]);
+    assert!(
+        drawn.err.contains("this is read as a coordinator") && drawn.err.contains("deployments/NAME.yaml"),
+        "{}",
+        drawn.err
+    );
     assert_eq!(help(&["check", "empty/none/nope.yaml", "--json"]), "there is no folder empty/none either");
 }
