@@ -115,6 +115,7 @@ pub fn answers(deployment: &Deployment, chart: &Chart) -> BTreeSet<EventName> {
 
 fn raised(deployment: &Deployment, chart: &Chart, findings: &mut Findings) {
     let ids: Vec<&str> = deployment.configurations.iter().map(|c| c.id.as_str()).collect();
+    let mut unknown = BTreeSet::new();
     let emits: BTreeSet<EventName> = deployment.emits.iter().map(|(e, _)| *e).collect();
     for site in chart.raises() {
         let known = match Raise::of(site.name, |id| deployment.configuration(id).is_some()) {
@@ -126,6 +127,7 @@ fn raised(deployment: &Deployment, chart: &Chart, findings: &mut Findings) {
         if known || (site.scoped && matches!(site.when, RaiseMoment::Exit(_))) {
             continue;
         }
+        unknown.insert(site.name);
         if let Some(finding) = paths::raised(deployment, site.name) {
             findings.push(finding.at(site.origin).labelled("raised here").path(place(chart, site.when)));
             continue;
@@ -156,7 +158,12 @@ fn raised(deployment: &Deployment, chart: &Chart, findings: &mut Findings) {
     for (event, origin) in &deployment.emits {
         if !raised.contains(event) {
             let known: Vec<&str> = raised.iter().map(|e| e.as_str()).collect();
-            let near = nearest(event.as_str(), known).map_or_else(
+            let near = nearest(event.as_str(), known);
+            // Where that is nothing that there is, it is said there what was meant.
+            if near.is_some_and(|near| unknown.iter().any(|name| name.as_str() == near)) {
+                continue;
+            }
+            let near = near.map_or_else(
                 || "raise it in the coordinator, or leave it out".to_owned(),
                 |near| format!("did you mean `{near}`?"),
             );

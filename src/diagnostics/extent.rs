@@ -163,9 +163,10 @@ pub fn find_alone(text: &str, range: Range<usize>, word: &str) -> Option<Range<u
     None
 }
 
-/// The first name in a range that begins with `head` and a point: what a subsystem exports, as it is written where it is used.
+/// The first name in a range that begins with the path `head`: what a subsystem exports, as it is written where it is used (`head.speed`),
+/// or the beginning of a name that is put together (`"head/" .. how`).
 pub fn find_member(text: &str, range: Range<usize>, head: &str) -> Option<Range<usize>> {
-    let found = find_word(text, range.clone(), &format!("{head}."))?;
+    let found = ['.', '/'].iter().find_map(|mark| find_word(text, range.clone(), &format!("{head}{mark}")))?;
     let rest = &text[found.end..range.end];
     let length = rest.find(|c: char| !(c.is_alphanumeric() || matches!(c, '_' | '.'))).unwrap_or(rest.len());
     Some(found.start..found.end + length)
@@ -267,6 +268,7 @@ mod tests {
         assert_eq!(found(find(text, all.clone(), "left")), at("left.s", "left"));
         assert_eq!(found(find(text, all.clone(), "spe")), None);
         assert_eq!(found(find_member(text, all.clone(), "left")), at("left.s", "left.spede"));
+        assert_eq!(find_member("tgt = 'left', 'left/' .. how", 0..28, "left"), Some(15..20));
         assert_eq!(found(find_read(text, all.clone(), "bus")), at("bus, a", "bus"));
         assert_eq!(found(find_alone(text, all, "undo")), Some((text.len() - 4, "undo".to_owned())));
     }

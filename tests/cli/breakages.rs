@@ -154,6 +154,18 @@ fn the_demo_is_sound() {
 }
 
 #[test]
+fn what_reading_found_stands_among_what_was_followed_by_what_it_is_worth() {
+    let demo = Demo::new();
+    demo.replace("deployment.yaml", "types:\n", "parameters: { unread: { type: float, default: 1.0 } }\ntypes:\n");
+    // The demo has notes.
+    let json = demo.run(&["check", "deployment.yaml", "--json"]).json();
+    let found: Vec<&str> = json["findings"].as_array().unwrap().iter().filter_map(|f| f["severity"].as_str()).collect();
+    assert!(found.first() == Some(&"warning") && found.contains(&"info"), "{json:#}");
+    let shown = demo.run(&["check", "deployment.yaml"]).err;
+    assert!(shown.contains("⚠ no Lua file reads the parameter `unread`"), "{shown}");
+}
+
+#[test]
 fn every_mistake_is_found_where_it_is() {
     let mut wrong = Vec::new();
     for mistake in MISTAKES {
