@@ -144,7 +144,7 @@ fn find_word(text: &str, range: Range<usize>, word: &str) -> Option<Range<usize>
     let (first, last) = (word.starts_with(named), word.ends_with(named));
     let alone = |at: &usize| {
         let (before, after) = (&inside[..*at], &inside[at + word.len()..]);
-        !(first && before.ends_with(named)) && !(last && after.starts_with(named))
+        !(first && before.ends_with(named) || last && after.starts_with(named))
     };
     let found = inside.match_indices(word).map(|(at, _)| at).find(alone)?;
     Some(range.start + found..range.start + found + word.len())
