@@ -90,7 +90,10 @@ fn read_loaded(loaded: Loaded, extensions: &Extensions, other: Option<Ident>) ->
                 Finding::error(DEPLOY_UNKNOWN_LIBRARY, format!("this program has no component library `{name}`"))
                     .at(deployment.key_origin("libraries"))
                     .path("libraries")
-                    .help(did_you_mean(name.as_str(), "libraries", known)),
+                    .help(format!(
+                        "{}; others are brought by a program of one's own, as `examples/scara` is one (`docs/scara.md`)",
+                        did_you_mean(name.as_str(), "libraries", known)
+                    )),
             );
             return Err(Refused { findings, sources: loaded.sources, unreadable: false });
         }

@@ -7,6 +7,7 @@
 
 use super::universe::{Creation, Creations, Universe};
 use crate::limits;
+use crate::model::finding::nearest;
 use crate::model::{
     Change, ChangeKind, ComponentName, ConfigId, Configuration, Deployment, Findings, Origin, Target, TypeName,
 };
@@ -14,6 +15,9 @@ use crate::plan::PlanContext;
 use crate::plan::meant::Meant;
 use crate::system::{Picture, Violation, either};
 use smallvec::SmallVec;
+
+/// What stands for all other components in a list of states.
+const DEFAULT: &str = "_default";
 
 /// What is wrong with each configuration by itself.
 pub fn check(deployment: &Deployment, universe: &Universe) -> Findings {
@@ -57,7 +61,13 @@ impl<'a> ConfigurationCheck<'a> {
                 if let Target::Component(component) = entry.target
                     && self.universe.of(component).is_empty()
                 {
-                    self.findings.push(self.universe.unknown(component, entry.origin).path(path(i)));
+                    let mut unknown = self.universe.unknown(component, entry.origin);
+                    if component.as_str().starts_with('_')
+                        && let Some(near) = nearest(component.as_str(), [DEFAULT])
+                    {
+                        unknown = unknown.help(format!("did you mean `{near}`?"));
+                    }
+                    self.findings.push(unknown.path(path(i)));
                 }
             }
         }

@@ -1,5 +1,6 @@
 //! The coordinator against the deployment: what it asks for, what it waits for, which states the deployment names.
 
+use super::paths;
 use crate::model::codes::{
     COORD_ANSWER_NEVER_COMES, COORD_NEAR_EVENT, COORD_NEVER_EMITTED, COORD_UNKNOWN_ANSWER, COORD_UNKNOWN_REQUEST,
     DEPLOY_EVENT_UNHEARD, DEPLOY_UNKNOWN_STATE,
@@ -7,7 +8,7 @@ use crate::model::codes::{
 use crate::model::finding::{closest, did_you_mean, nearest};
 use crate::model::statechart::is_internal;
 use crate::model::{Ask, ConfigId, Deployment, EventName, FAULTED, Finding, Findings, Monitor, Raise, Verdict};
-use crate::statechart::{Chart, EdgeId, EventId, NodeId, RaiseMoment};
+use crate::statechart::{Chart, EdgeId, EventId, FindError, NodeId, RaiseMoment};
 use std::collections::BTreeSet;
 
 /// What a raised name asks for; none when it is no request.
@@ -23,12 +24,17 @@ pub fn bad_answers(ask: Ask) -> [EventName; 2] {
     [ask.failed().event(ask), ask.broken().event(ask)]
 }
 
-/// What is wrong between the coordinator and the deployment. `told`: what coordinators raise.
-pub fn check(deployment: &Deployment, chart: &Chart, told: &BTreeSet<EventName>) -> Findings {
+/// What is wrong between the coordinator and the deployment. `told`: what coordinators raise; `waited_for`: what transitions of any of them list.
+pub fn check(
+    deployment: &Deployment,
+    chart: &Chart,
+    told: &BTreeSet<EventName>,
+    waited_for: &BTreeSet<EventName>,
+) -> Findings {
     let mut findings = Vec::new();
     states(deployment, chart, &mut findings);
     raised(deployment, chart, &mut findings);
-    heard(deployment, chart, told, &mut findings);
+    heard(deployment, chart, (told, waited_for), &mut findings);
     findings
 }
 
@@ -47,12 +53,19 @@ fn states(deployment: &Deployment, chart: &Chart, findings: &mut Findings) {
             let names: Vec<String> =
                 chart.nodes().filter(|n| chart.is_state(*n)).map(|n| chart.name(n).to_string()).collect();
             let own = state.rsplit('.').next().unwrap_or(state);
+            let (message, help) = match &error {
+                FindError::Unknown { name, .. } => (
+                    format!("{key}: the coordinator has no state `{name}`"),
+                    did_you_mean(own, "states", names.iter().map(String::as_str)),
+                ),
+                FindError::Ambiguous { .. } => (format!("{key}: {error}"), "write one of these names".to_owned()),
+            };
             findings.push(
-                Finding::error(DEPLOY_UNKNOWN_STATE, format!("{key}: {error}"))
+                Finding::error(DEPLOY_UNKNOWN_STATE, message)
                     .at(at)
                     .path(key)
                     .also(deployment.first_coordinator().chart.root.origin, "the coordinator")
-                    .help(did_you_mean(own, "states", names.iter().map(String::as_str))),
+                    .help(help),
             );
         }
     }
@@ -102,6 +115,7 @@ pub fn answers(deployment: &Deployment, chart: &Chart) -> BTreeSet<EventName> {
 
 fn raised(deployment: &Deployment, chart: &Chart, findings: &mut Findings) {
     let ids: Vec<&str> = deployment.configurations.iter().map(|c| c.id.as_str()).collect();
+    let mut unknown = BTreeSet::new();
     let emits: BTreeSet<EventName> = deployment.emits.iter().map(|(e, _)| *e).collect();
     for site in chart.raises() {
         let known = match Raise::of(site.name, |id| deployment.configuration(id).is_some()) {
@@ -113,9 +127,16 @@ fn raised(deployment: &Deployment, chart: &Chart, findings: &mut Findings) {
         if known || (site.scoped && matches!(site.when, RaiseMoment::Exit(_))) {
             continue;
         }
+        unknown.insert(site.name);
+        if let Some(finding) = paths::raised(deployment, site.name) {
+            findings.push(finding.at(site.origin).labelled("raised here").path(place(chart, site.when)));
+            continue;
+        }
         let (id, undo) = site.name.as_str().strip_suffix(".undo").map_or((site.name.as_str(), ""), |id| (id, ".undo"));
         let candidates = ids.iter().copied().chain(emits.iter().map(|e| e.as_str()).filter(|_| undo.is_empty()));
-        let help = did_you_mean(id, "configurations", candidates);
+        // `run.udno` is nearer to what undoes `run` than to `run`.
+        let undos: Vec<String> = ids.iter().filter(|_| id.contains('.')).map(|id| format!("{id}.undo")).collect();
+        let help = did_you_mean(id, "configurations", candidates.chain(undos.iter().map(String::as_str)));
         let message = if site.scoped || !undo.is_empty() {
             format!("there is no configuration `{id}`")
         } else {
@@ -127,14 +148,22 @@ fn raised(deployment: &Deployment, chart: &Chart, findings: &mut Findings) {
                 .labelled("raised here")
                 .path(place(chart, site.when))
                 .also(deployment.key_origin("configurations"), "the configurations of the deployment")
-                .help(format!("{help}; an event that is meant to leave the deployment is listed under `emits`")),
+                .help(match id.contains('.') {
+                    true => help,
+                    false => format!("{help}; an event that is meant to leave the deployment is listed under `emits`"),
+                }),
         );
     }
     let raised: BTreeSet<EventName> = chart.raises().iter().map(|s| s.name).collect();
     for (event, origin) in &deployment.emits {
         if !raised.contains(event) {
             let known: Vec<&str> = raised.iter().map(|e| e.as_str()).collect();
-            let near = nearest(event.as_str(), known).map_or_else(
+            let near = nearest(event.as_str(), known);
+            // Where that is nothing that there is, it is said there what was meant.
+            if near.is_some_and(|near| unknown.iter().any(|name| name.as_str() == near)) {
+                continue;
+            }
+            let near = near.map_or_else(
                 || "raise it in the coordinator, or leave it out".to_owned(),
                 |near| format!("did you mean `{near}`?"),
             );
@@ -168,15 +197,23 @@ fn never_raised(deployment: &Deployment, event: &str) -> Option<Finding> {
     })
 }
 
-fn heard(deployment: &Deployment, chart: &Chart, told: &BTreeSet<EventName>, findings: &mut Findings) {
+fn heard(
+    deployment: &Deployment,
+    chart: &Chart,
+    (told, waited_for): (&BTreeSet<EventName>, &BTreeSet<EventName>),
+    findings: &mut Findings,
+) {
     let answers = answers(deployment, chart);
     let ids: Vec<&str> = deployment.configurations.iter().map(|c| c.id.as_str()).collect();
-    let mut known: BTreeSet<&str> =
+    let confirms: BTreeSet<&str> =
         deployment.configurations.iter().filter_map(|c| c.confirm.map(|c| c.event)).map(|e| e.as_str()).collect();
+    let mut known = confirms.clone();
     known.extend([deployment.deploy.event.as_str(), deployment.shutdown.event.as_str()]);
     known.extend(deployment.reactions.iter().map(|reaction| reaction.raise.as_str()));
     known.extend(deployment.monitors.iter().flat_map(Monitor::events).map(|e| e.as_str()));
     let accepted: BTreeSet<&str> = deployment.interface.accepts.iter().map(|(event, _)| event.as_str()).collect();
+    // Of what nobody hears it is said where it is raised, with what may have been meant.
+    let told_there = |name: &str| !confirms.contains(name) && !waited_for.iter().any(|event| event.as_str() == name);
     // Another number is another thing, and no slip.
     let letters = |name: &str| name.replace(|c: char| c.is_ascii_digit(), "");
     let declared: BTreeSet<EventName> =
@@ -204,6 +241,7 @@ fn heard(deployment: &Deployment, chart: &Chart, told: &BTreeSet<EventName>, fin
                     && let Some(near) = nearest(&text, known.union(&accepted).copied())
                     && strsim::damerau_levenshtein(&text, near) <= slips
                     && letters(&text) != letters(near)
+                    && !told_there(near)
                 {
                     findings.push(
                         Finding::warning(

@@ -66,6 +66,7 @@ mod orders;
 mod other_frames;
 mod outcome;
 mod outside;
+mod paths;
 mod places;
 mod probe;
 mod product;

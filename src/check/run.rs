@@ -12,7 +12,8 @@ use super::state::Failed;
 use super::verdict::CheckVerdict;
 use super::{
     alone, composed, configurations as single, coordinator, coupling, declared, interface, lets_go, library,
-    monitors as watched, purity, safety, settings, simulated, types, undriven, unhandled, universe, unwatched, ways,
+    monitors as watched, paths, purity, safety, settings, simulated, types, undriven, unhandled, universe, unwatched,
+    ways,
 };
 use crate::limits;
 use crate::model::codes::{CLASH, POST_ON_DESTROYED, PRE_ON_CREATED, TOUCHES_DESTROYED};
@@ -81,6 +82,7 @@ fn run_one(
         findings.extend(interface::check(deployment, &universe, &charts));
         if deployment.own.is_none() {
             findings.extend(interface::between(deployment, &charts, catalogue));
+            findings.extend(paths::heard(deployment, &charts));
         }
         let of = |number| coupling::view(deployment, &charts, number);
         let views: Vec<Deployment> = (0..all).filter_map(of).collect();
@@ -89,8 +91,9 @@ fn run_one(
             .flat_map(|chart| chart.raises())
             .filter_map(|site| EventName::new(site.name.as_str()).ok())
             .collect();
+        let waited_for: BTreeSet<EventName> = charts.iter().flat_map(|chart| chart.events()).copied().collect();
         for (view, chart) in views.iter().zip(&charts) {
-            findings.extend(coordinator::check(view, chart, &told));
+            findings.extend(coordinator::check(view, chart, &told, &waited_for));
             findings.extend(unhandled::check(view, chart));
             findings.extend(purity::check(view));
         }

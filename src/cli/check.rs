@@ -91,6 +91,7 @@ impl Run for Args {
         report.verdict = report.verdict.with(&read.findings);
         report.findings.extend(read.findings);
         report.traces.resize(report.findings.len(), Vec::new());
+        sort(&mut report);
         let no = match report.verdict {
             CheckVerdict::Refused => true,
             CheckVerdict::Sound => false,
@@ -105,7 +106,6 @@ impl Run for Args {
         if let Some(number) = self.trace {
             return self.way(context, &read.deployment, &report, number, exit);
         }
-        // Errors come first, notes last.
         let notes = report.findings.iter().position(|f| f.severity == Severity::Info).filter(|_| !self.notes);
         let (found, notes) = report.findings.split_at(notes.unwrap_or(report.findings.len()));
         out.findings(found, &read.sources);
@@ -209,6 +209,14 @@ impl Args {
             )),
         }
     }
+}
+
+/// Errors come first, notes last, each with its way.
+fn sort(report: &mut Report) {
+    let (findings, traces) = (std::mem::take(&mut report.findings), std::mem::take(&mut report.traces));
+    let mut all: Vec<_> = findings.into_iter().zip(traces).collect();
+    all.sort_by_key(|(finding, _)| std::cmp::Reverse(finding.severity));
+    (report.findings, report.traces) = all.into_iter().unzip();
 }
 
 fn show_way(context: &CommandContext, finding: &Finding, trace: &[TraceStep], exit: Exit) -> Exit {

@@ -5,7 +5,8 @@ use super::output::Style;
 use super::remote::{Patience, WITHIN, Which, ask, seconds};
 use super::request::Asking;
 use super::status::text;
-use super::{CommandContext, CommandResult, Run};
+use super::{CommandContext, CommandFailure, CommandResult, Run};
+use crate::model::codes::TEXT_NOT_FINITE;
 use serde_json::{Value as Json, json};
 
 /// Show what a property or a port of a running deployment is worth: value, unit, and when that was.
@@ -82,7 +83,13 @@ impl Run for SetArgs {
         let patience = self.asking.patience();
         let params = json!({ "name": self.member, "within_s": 0 });
         let seen = ask(self.asking.which.name.as_deref(), "get", &params, patience.left())?;
-        let value = meant(&self.value, text(&seen["type"]));
+        let ty = text(&seen["type"]);
+        let number = self.value.parse::<f64>().ok().filter(|_| matches!(ty, "float" | "int"));
+        if number.is_some_and(|number| !number.is_finite()) {
+            let message = format!("`{}` is no finite number", self.value);
+            return Err(CommandFailure::usage(TEXT_NOT_FINITE, message, "numbers go up to about 1.8e308"));
+        }
+        let value = meant(&self.value, ty);
         let params = json!({ "name": self.member, "value": value, "force": self.force });
         self.asking.request(context, "set", params, &patience)
     }

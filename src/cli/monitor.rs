@@ -12,7 +12,7 @@ use crate::model::codes::{
     CLI_UNKNOWN_MONITOR, SAMPLES_COLUMNS, SAMPLES_GAP, SAMPLES_MERGED, SAMPLES_MISSING, SAMPLES_NAN, SAMPLES_RENAMED,
     SAMPLES_UNREADABLE, SAMPLES_UNUSED,
 };
-use crate::model::finding::{did_you_mean, has_errors};
+use crate::model::finding::{did_you_mean, has_errors, nearest};
 use crate::model::{Finding, Findings, Monitor, Origin};
 use crate::monitor::replay::{MonitorEvent, Replay, Tally};
 use crate::monitor::table::{Columns, TableProblem, decimal, empty, is_blank};
@@ -144,19 +144,21 @@ impl Run for Args {
         let (mut replay, missing) = Replay::new(&monitors, columns, &renamed);
         let header = sources.add_excerpt(name.as_str(), lines.text.trim_end(), 1);
         let header = sources.whole_file(header);
-        findings.extend(misnamed(&renamed, &replay, &known, header));
+        findings.extend(misnamed(&renamed, &replay, &known, |column| sources.within(header, column)));
         for input in &missing {
             let input = input.to_string();
             if renamed.iter().any(|(signal, _)| *signal == input) {
                 continue; // said already
             }
             let near = did_you_mean(&input, "columns", known.iter().map(String::as_str));
+            let meant = nearest(&input, known.iter().map(String::as_str));
             findings.push(
                 Finding::error(SAMPLES_MISSING, format!("the recording has no column `{input}`"))
-                    .at(header)
+                    .at(meant.map_or(header, |column| sources.within(header, column)))
                     .help(format!("{near}; `--column {input}=NAME` takes it from a column of another name")),
             );
         }
+        let looked_past = replay.unused().first().map_or(header, |column| sources.within(header, column));
         let unused: Vec<String> = replay.unused().iter().map(|name| format!("`{name}`")).collect();
         if !unused.is_empty() {
             let more = unused.len().saturating_sub(8);
@@ -164,7 +166,7 @@ impl Run for Args {
             let and = if more > 0 { format!(" and {more} more") } else { String::new() };
             findings.push(
                 Finding::info(SAMPLES_UNUSED, format!("no monitor looks at {shown}{and}"))
-                    .at(header)
+                    .at(looked_past)
                     .help("nothing needs to be done, unless one of them was meant to be looked at"),
             );
         }
@@ -274,7 +276,12 @@ fn summary(monitors: &[Monitor], replay: &Replay, ok: bool, findings: &Value) ->
 }
 
 /// What `--column` names that is not there: a signal that no monitor looks at, a column that the recording does not have.
-fn misnamed(renamed: &[(String, String)], replay: &Replay, known: &[String], header: Origin) -> Findings {
+fn misnamed(
+    renamed: &[(String, String)],
+    replay: &Replay,
+    known: &[String],
+    mut at: impl FnMut(&str) -> Origin,
+) -> Findings {
     let mut findings = Vec::new();
     let signals = replay.signals();
     for (signal, column) in renamed {
@@ -286,7 +293,9 @@ fn misnamed(renamed: &[(String, String)], replay: &Replay, known: &[String], hea
         } else if !known.contains(column) {
             let near = did_you_mean(column, "columns", known.iter().map(String::as_str));
             let message = format!("{option}: the recording has no column `{column}`");
-            findings.push(Finding::error(SAMPLES_RENAMED, message).at(header).help(near));
+            // Without one that is near: the header, in which it would be.
+            let meant = nearest(column, known.iter().map(String::as_str)).unwrap_or_default();
+            findings.push(Finding::error(SAMPLES_RENAMED, message).at(at(meant)).help(near));
         }
     }
     findings

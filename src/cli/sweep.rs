@@ -9,6 +9,8 @@ use super::run::known;
 use super::signals::SignalWatch;
 use super::{CommandContext, CommandFailure, CommandResult, Run};
 use crate::app::script::digits;
+use crate::diagnostics::SourceMap;
+use crate::lang::Sources;
 use crate::limits;
 use crate::model::Code;
 use crate::model::codes::{SCRIPT_UNKNOWN_PARAMETER, TEXT_UNKNOWN_PARAMETER};
@@ -58,6 +60,10 @@ impl Run for Args {
         let axes = axes(&self.set)?;
         if let Some(platform) = &self.platform {
             known(platform, &context.extensions)?;
+        }
+        if let Err(finding) = Sources::Disk.read(&self.script) {
+            let failure = CommandFailure::found(vec![*finding], SourceMap::new());
+            return Err(CommandFailure { exit: Exit::Usage, ..failure });
         }
         let points = points(&axes);
         let stop = Arc::new(AtomicBool::new(false));

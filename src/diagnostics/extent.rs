@@ -113,7 +113,7 @@ pub fn find_name(text: &str, range: Range<usize>, word: &str, nth: usize) -> Opt
     found.filter(|span| text.get(span.clone()).is_some())
 }
 
-/// The first token in a range that is `word`: a name, or a string with that content; else one that contains it.
+/// The first token in a range that is `word`: a name, or a string with that content; else one in which it stands as a word.
 pub fn find(text: &str, range: Range<usize>, word: &str) -> Option<Range<usize>> {
     if word.is_empty() {
         return None;
@@ -128,18 +128,67 @@ pub fn find(text: &str, range: Range<usize>, word: &str) -> Option<Range<usize>>
             ExtentToken::Text(content) => content,
             _ => continue,
         };
-        let Some(content_text) = text.get(content.clone()) else { continue };
-        if content_text == word {
+        if text.get(content.clone()) == Some(word) {
             return Some(token).filter(|span| text.get(span.clone()).is_some());
         }
-        if part.is_none()
-            && let Some(inside) = content_text.find(word)
-        {
-            part = Some(content.start + inside..content.start + inside + word.len());
-        }
+        part = part.or_else(|| find_word(text, content, word));
     }
     // Words that are no token of Lua (`youbot.setControlMode`, unquoted in YAML).
-    part.or_else(|| text.get(range.clone())?.find(word).map(|i| range.start + i..range.start + i + word.len()))
+    part.or_else(|| find_word(text, range, word))
+}
+
+/// The first place in a range where `word` stands by itself, and is no piece of a longer name.
+fn find_word(text: &str, range: Range<usize>, word: &str) -> Option<Range<usize>> {
+    let inside = text.get(range.clone())?;
+    let named = |c: char| c.is_alphanumeric() || c == '_';
+    let (first, last) = (word.starts_with(named), word.ends_with(named));
+    let alone = |at: &usize| {
+        let (before, after) = (&inside[..*at], &inside[at + word.len()..]);
+        !(first && before.ends_with(named) || last && after.starts_with(named))
+    };
+    let found = inside.match_indices(word).map(|(at, _)| at).find(alone)?;
+    Some(range.start + found..range.start + found + word.len())
+}
+
+/// The first place in a range where `word` is all that stands there: neither `run.word` nor `word.x` nor `word/x`.
+pub fn find_alone(text: &str, range: Range<usize>, word: &str) -> Option<Range<usize>> {
+    let mut from = range.start;
+    while let Some(found) = find_word(text, from..range.end, word) {
+        let joined = |c: char| matches!(c, '.' | '/');
+        if !text[..found.start].ends_with(joined) && !text[found.end..].starts_with(joined) {
+            return Some(found);
+        }
+        from = found.end;
+    }
+    None
+}
+
+/// The first name in a range that begins with the path `head`: what a subsystem exports, as it is written where it is used (`head.speed`),
+/// or the beginning of a name that is put together (`"head/" .. how`).
+pub fn find_member(text: &str, range: Range<usize>, head: &str) -> Option<Range<usize>> {
+    let found = ['.', '/'].iter().find_map(|mark| find_word(text, range.clone(), &format!("{head}{mark}")))?;
+    let rest = &text[found.end..range.end];
+    let length = rest.find(|c: char| !(c.is_alphanumeric() || matches!(c, '_' | '.'))).unwrap_or(rest.len());
+    Some(found.start..found.end + length)
+}
+
+/// The token `word` of a line where it is read: neither a field of something (`a.word`) nor a key that is given a value (`word = …`).
+pub fn find_read(text: &str, line: Range<usize>, word: &str) -> Option<Range<usize>> {
+    let bytes = text.as_bytes().get(..line.end)?;
+    let mut at = line.start;
+    while let Some((token, kind)) = next_token(bytes, at) {
+        at = token.end;
+        if kind != ExtentToken::Name || text.get(token.clone()) != Some(word) {
+            continue;
+        }
+        let (before, after) = (text[line.start..token.start].trim_end(), text[token.end..line.end].trim_start());
+        let given = after.starts_with('=') && !after.starts_with("==");
+        let field = before.ends_with(['.', ':']) && !before.ends_with("..");
+        if !given && !field {
+            return Some(token);
+        }
+    }
+    None
 }
 
 /// The token `word` of the element that begins on a line, which may be written over several: outside of what is made inside it
@@ -211,11 +260,28 @@ mod tests {
     }
 
     #[test]
+    fn a_piece_of_a_longer_name_is_no_word() {
+        let text = "connect('P.left_speed', 'left.spede', bus = bus, a.bus), run.undo, undo";
+        let found = |span: Option<Range<usize>>| span.map(|span| (span.start, text[span].to_owned()));
+        let at = |part: &str, word: &str| Some((text.find(part).unwrap(), word.to_owned()));
+        let all = 0..text.len();
+        assert_eq!(found(find(text, all.clone(), "left")), at("left.s", "left"));
+        assert_eq!(found(find(text, all.clone(), "spe")), None);
+        assert_eq!(found(find_member(text, all.clone(), "left")), at("left.s", "left.spede"));
+        assert_eq!(find_member("tgt = 'left', 'left/' .. how", 0..28, "left"), Some(15..20));
+        assert_eq!(found(find_read(text, all.clone(), "bus")), at("bus, a", "bus"));
+        assert_eq!(found(find_alone(text, all, "undo")), Some((text.len() - 4, "undo".to_owned())));
+    }
+
+    #[test]
     fn never_panics_on_any_cut() {
         let (text, tail) = ("é = { 'ü\\", "--[==[ x ]=] \"ö");
         let text = format!("{text}{tail}");
         for (i, _) in text.char_indices() {
-            let _ = (balanced(&text, i..i), find(&text, i..text.len(), "x"), token_end(&text, i));
+            let all = i..text.len();
+            let _ = (balanced(&text, i..i), find(&text, all.clone(), "x"), token_end(&text, i));
+            let _ =
+                (find_read(&text, all.clone(), "x"), find_alone(&text, all.clone(), "x"), find_member(&text, all, "x"));
         }
     }
 }

@@ -7,6 +7,7 @@
 mod extent;
 mod render;
 mod source_map;
+mod yaml_extent;
 
 pub use render::{RenderOptions, render, render_with, to_json};
 pub use source_map::{FileId, Language, Location, SourceFile, SourceMap};

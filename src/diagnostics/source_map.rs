@@ -1,6 +1,6 @@
 //! Where model elements were written.
 
-use super::extent;
+use super::{extent, yaml_extent};
 use crate::model::Origin;
 use std::borrow::Cow;
 use std::ops::Range;
@@ -75,6 +75,8 @@ enum TextPlace {
     Call { file: FileId, line: u32, nth: u32, word: &'static str },
     /// The first token `word` inside the place `parent`.
     Within { parent: Origin, word: Box<str> },
+    /// The token `word` on a line (from 1), where it is read.
+    Read { file: FileId, line: u32, word: Box<str> },
 }
 
 /// A place in a text.
@@ -190,6 +192,11 @@ impl SourceMap {
         self.add(TextPlace::Call { file, line, nth, word })
     }
 
+    /// The token `word` on a line (from 1) where it is read, and not where something of that name is given a value.
+    pub fn read(&mut self, file: FileId, line: u32, word: &str) -> Origin {
+        self.add(TextPlace::Read { file, line, word: word.into() })
+    }
+
     /// The token `word` inside the place `parent`; where that is not found, `parent` itself.
     pub fn within(&mut self, parent: Origin, word: &str) -> Origin {
         match self.places.get(parent.0 as usize) {
@@ -233,20 +240,47 @@ impl SourceMap {
         Some(self.location(file, span))
     }
 
-    /// Where a part of the element at `origin` stands: the token `word` inside it, if it is there.
+    /// Where a part of the element at `origin` stands: the token `word` inside it, if it is there; of a name of several parts also the last
+    /// one by itself (`A.k`, where the component is named around it), or what is written for it where a subsystem exports it.
     pub fn locate_part(&self, origin: Origin, word: &str) -> Option<Location> {
+        if let Some(found) = self.locate_word(origin, word) {
+            return Some(found);
+        }
         let whole = self.locate(origin)?;
         let source = self.file(whole.file);
-        if source.line(whole.line).end == whole.span.end {
+        let inside = self.inside(origin, &whole);
+        let found = match word.split_once('/') {
+            Some((path, _)) => extent::find_member(&source.text, inside, path),
+            None => extent::find_alone(&source.text, inside, word.rsplit_once('.')?.1),
+        };
+        Some(self.location(whole.file, found?))
+    }
+
+    /// The bytes of the element at `origin`, which begins at `whole`.
+    fn inside(&self, origin: Origin, whole: &Location) -> Range<usize> {
+        let source = self.file(whole.file);
+        let of_yaml = matches!(self.places.get(origin.0 as usize), Some(TextPlace::Exact { .. }));
+        match source.language {
+            Language::Lua => extent::balanced(&source.text, whole.span.clone()),
+            Language::Yaml if of_yaml && source.skipped == 0 => {
+                let reach = yaml_extent::reach(&source.text, whole.span.start);
+                reach.start..reach.end.max(whole.span.end)
+            }
+            Language::Yaml | Language::Scxml => whole.span.clone(),
+        }
+    }
+
+    fn locate_word(&self, origin: Origin, word: &str) -> Option<Location> {
+        let whole = self.locate(origin)?;
+        let source = self.file(whole.file);
+        let of_lines = !matches!(self.places.get(origin.0 as usize), Some(TextPlace::Exact { .. }));
+        if of_lines && source.line(whole.line).end == whole.span.end {
             // Of a line it is not known where what begins there ends.
             let found = extent::find_in_element(&source.text, whole.span.clone(), word);
             let found = found.or_else(|| extent::find(&source.text, whole.span.clone(), word));
             return found.map(|span| self.location(whole.file, span));
         }
-        let inside = match source.language {
-            Language::Lua => extent::balanced(&source.text, whole.span.clone()),
-            Language::Yaml | Language::Scxml => whole.span,
-        };
+        let inside = self.inside(origin, &whole);
         Some(self.location(whole.file, extent::find(&source.text, inside, word)?))
     }
 
@@ -278,6 +312,12 @@ impl SourceMap {
                 let line = source.line(*line);
                 let indent = source.text[line.clone()].len() - source.text[line.clone()].trim_start().len();
                 (*file, line.start + indent..line.end)
+            }
+            TextPlace::Read { file, line, word } => {
+                let source = self.file(*file);
+                let line = source.line(*line);
+                let found = extent::find_read(&source.text, line.clone(), word);
+                (*file, found.or_else(|| extent::find(&source.text, line.clone(), word)).unwrap_or(line))
             }
             TextPlace::Call { file, line, nth, word } => {
                 let source = self.file(*file);

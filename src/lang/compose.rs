@@ -242,7 +242,7 @@ impl Resolve<'_> {
                 member
             }
             None => {
-                let message = format!("`{}` exports nothing called `{}`", subsystem.name, member.member);
+                let message = format!("`{member}` is nothing that `{}` exports", subsystem.name);
                 let known = exports.iter().filter(|(_, export)| export.kind == kind).map(|(name, _)| name.as_str());
                 let (name, key) = (member.member, kind.several());
                 let help = did_you_mean(name.as_str(), key, known.clone());

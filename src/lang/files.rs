@@ -60,11 +60,7 @@ impl Sources {
                 };
                 let meta = std::fs::metadata(path).map_err(cannot)?;
                 if meta.is_dir() {
-                    return Err(refuse(
-                        codes::TEXT_UNREADABLE,
-                        format!("{shown} is a folder"),
-                        "name a file in it".to_owned(),
-                    ));
+                    return Err(refuse(codes::TEXT_UNREADABLE, format!("{shown} is a folder"), self.in_folder(path)));
                 }
                 if meta.len() > limits::FILE_BYTES {
                     return Err(too_large());
@@ -95,6 +91,18 @@ impl Sources {
                 "save the file as UTF-8".to_owned(),
             )
         })
+    }
+
+    /// Files of a folder that was given in place of one of them: those that may be deployments first.
+    fn in_folder(&self, folder: &Path) -> String {
+        let mut names = self.inside(folder).unwrap_or_default();
+        names.sort_by_key(|name| language(Path::new(name)) != Some(Language::Yaml));
+        let named = |name: &String| format!("`{}`", normal(&folder.join(name)).display());
+        let some: Vec<String> = names.iter().take(4).map(named).collect();
+        match some.is_empty() {
+            true => "name a file in it".to_owned(),
+            false => format!("name a file in it, such as {}", some.join(", ")),
+        }
     }
 
     /// Files near to a name that does not exist: in its folder, else in that for deployments below it.

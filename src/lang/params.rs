@@ -5,7 +5,7 @@ use super::yaml;
 use crate::diagnostics::Language;
 use crate::lang::tree::Reading;
 use crate::model::finding::{did_you_mean, nearest};
-use crate::model::{Finding, Ident, Origin, codes};
+use crate::model::{Finding, Ident, Origin, ValueType, codes};
 
 /// A parameter.
 #[derive(Debug)]
@@ -118,6 +118,11 @@ impl Params {
                 self.place.subsystems.iter().filter(|_| dotted).map(|name| name.as_str()).collect();
             let help = match nearest(&param.name, subsystems.iter().copied()) {
                 Some(near) => format!("did you mean the subsystem `{near}`?"),
+                // In a file of YAML nothing is read.
+                None if known.is_empty() && subsystems.is_empty() => format!(
+                    "files in Lua read it as the global `{}`, files in YAML read none: leave it out, or write in Lua what depends on it",
+                    param.name
+                ),
                 None => {
                     let what = if subsystems.is_empty() { "parameters" } else { "parameters and subsystems" };
                     known.extend(subsystems);
@@ -137,6 +142,15 @@ impl Params {
 fn bad(path: &str, text: &str, why: &str) -> Finding {
     Finding::error(codes::TEXT_BAD_PARAMETER, format!("`--set {path}={text}`: {why}"))
         .help("write `--set name=value` or `--set table.key=value`; the value is read as YAML")
+}
+
+/// The value that the command line gives for a parameter that is declared: where that is a text, a number is one.
+pub fn value_for(cx: &mut Cx, within: &str, (path, text): (&str, &str), ty: &ValueType) -> Option<(Node, Origin)> {
+    let (mut value, whole) = value_of(cx, within, path, text)?;
+    if *ty == ValueType::Str && matches!(value.kind, Kind::Bool(_) | Kind::Int(_) | Kind::Float(_)) {
+        value.kind = Kind::Str(text.trim().to_owned().into());
+    }
+    Some((value, whole))
 }
 
 /// The value that the command line gives, and where that stands. `within` stands before the name there.

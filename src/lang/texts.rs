@@ -33,6 +33,10 @@ pub(super) fn host_files(paths: &[PathBuf]) -> Vec<(PathBuf, Origin)> {
 /// Reads a text into the source map. `named_at` is the place that named the file.
 pub(super) fn open(cx: &mut Cx, from: &Sources, path: &Path, named_at: Origin) -> Option<(Reading, Language)> {
     let Some(language) = files::language(path) else {
+        if let (Sources::Disk, true, Err(folder)) = (from, path.is_dir(), from.read(path)) {
+            cx.refuse(folder.at(named_at));
+            return None;
+        }
         let message = format!("{} is neither Lua, YAML nor SCXML by its name", path.display());
         let help = "files end in `.lua`, `.yaml` or `.yml`, or `.scxml` for a coordinator";
         cx.refuse(Finding::error(codes::TEXT_UNKNOWN_LANGUAGE, message).at(named_at).help(help));

@@ -6,12 +6,14 @@
 //! run as a trusted one.
 
 use super::files::Sources;
+use super::grammar::primitive;
 use super::lower::chart;
 use super::lua;
 use super::params::Params;
 use super::print;
 use super::slips;
 use super::tree::{Cx, Entry, Kind, Node, Reading};
+use super::words;
 use crate::diagnostics::{FileId, Language};
 use crate::functions::{self, Field, NotOpened, Short, Spot};
 use crate::limits;
@@ -254,6 +256,12 @@ fn json(node: &Node) -> serde_json::Value {
     }
 }
 
+/// Whether a name is what files of configurations and of monitors are made of, and no coordinator.
+fn is_of_another_file(name: &str) -> bool {
+    let whole = ["ConfiguratorConf", "Configuration", "Monitors", "monitor"];
+    whole.contains(&name) || primitive(name).is_some() || words::find(name).is_some()
+}
+
 /// The finding of a program that gives no chart.
 fn refuse(cx: &mut Cx, ids: &FxHashMap<String, FileId>, reading: Reading, failure: &NotOpened, open: Openings) {
     let id = ids.get(&failure.file).copied().unwrap_or(reading.file);
@@ -270,6 +278,12 @@ fn refuse(cx: &mut Cx, ids: &FxHashMap<String, FileId>, reading: Reading, failur
     }
     if let Some(name) = &failure.missing {
         let place = cx.sources.within(at, name);
+        if is_of_another_file(name) {
+            let message = format!("`{name}` is of configurations or monitors, and this is read as a coordinator");
+            let help = "give the deployment's file (`deployments/NAME.yaml`); this one can be named in it";
+            cx.report(Finding::error(codes::TEXT_NOTHING, message).at(place).labelled("used here").help(help));
+            return;
+        }
         let closed = Openings::NAMES.contains(&name.as_str());
         let finding = if closed && !(name == "io" && open.io) {
             Finding::error(codes::LUA_CLOSED, format!("`{name}` is not open to this model")).at(place).help(format!(

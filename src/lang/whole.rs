@@ -87,16 +87,18 @@ impl DeploymentReader<'_> {
         let declared = &draft.interface.parameters;
         let (mut given, mut others) = (part.given, Vec::new());
         for (path, text) in set.iter().filter(|(path, _)| !inner(path)) {
-            if !declared.keys().any(|name| name.as_str() == path) {
+            let Some((_, parameter)) = declared.iter().find(|(name, _)| name.as_str() == path) else {
                 others.push((path.clone(), text.clone()));
-            } else if let Some((value, origin)) = params::value_of(cx, &part.within, path, text) {
+                continue;
+            };
+            if let Some((value, origin)) = params::value_for(cx, &part.within, (path, text), &parameter.ty) {
                 given.retain(|entry| entry.key != path.as_str());
                 given.push(Entry { key: path.clone().into(), origin, value });
             }
         }
         let mut with = draft.with;
         let at = if part.at.is_some() { part.at } else { origin };
-        for entry in interface::given(cx, declared, given, &part.of, at) {
+        for entry in interface::given(cx, declared, given, (&part.of, &part.within), at) {
             if let Some(twice) = with.iter().find(|other| other.key == entry.key) {
                 let message = format!("`{}` is a parameter, and given under `with` too", entry.key);
                 let finding = Finding::error(codes::TEXT_DUPLICATE_KEY, message).at(twice.origin);

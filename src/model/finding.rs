@@ -162,16 +162,23 @@ pub fn configuration(finding: &Finding) -> Option<&str> {
 /// The known name nearest to `name`, if one is near enough to be what was meant: as a whole, or, where `name` has one part
 /// only, by its last part (`Gian` for `standard.Gain`).
 pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    let near = |candidate: &str| strsim::jaro_winkler(&name.to_lowercase(), &candidate.to_lowercase());
+    // Whether it is near enough is asked of the whole; which is nearest, of what would have to be typed otherwise, and then of how they
+    // begin: capitals count only there.
+    let near = |candidate: &str| {
+        let (ours, other) = (name.to_lowercase(), candidate.to_lowercase());
+        let begins = name.chars().next().map(char::is_uppercase) == candidate.chars().next().map(char::is_uppercase);
+        let slips = strsim::osa_distance(&ours, &other) + usize::from(!begins);
+        (slips, strsim::jaro_winkler(&ours, &other), strsim::jaro_winkler(name, candidate))
+    };
     known
         .into_iter()
         .filter(|candidate| *candidate != name)
-        .map(|candidate| match candidate.rsplit_once('.') {
-            Some((_, last)) if !name.contains('.') => (near(candidate).max(near(last)), candidate),
-            _ => (near(candidate), candidate),
+        .flat_map(|candidate| {
+            let last = candidate.rsplit_once('.').filter(|_| !name.contains('.')).map(|(_, last)| last);
+            std::iter::once(candidate).chain(last).map(move |part| (near(part), candidate))
         })
-        .filter(|(score, _)| *score > 0.8)
-        .max_by(|a, b| a.0.total_cmp(&b.0).then_with(|| b.1.cmp(a.1)))
+        .filter(|((_, score, _), _)| *score > 0.8)
+        .min_by(|(a, one), (b, other)| a.0.cmp(&b.0).then(b.2.total_cmp(&a.2)).then(one.cmp(other)))
         .map(|(_, candidate)| candidate)
 }
 
@@ -233,6 +240,16 @@ mod tests {
         assert_eq!(nearest("Gain", known), Some("standard.Gain"));
         assert_eq!(nearest("yubot.Dynamics", known), Some("youbot.Dynamics"));
         assert_eq!(nearest("Winch", known), None);
+        let words = ["Configuration", "ConfiguratorConf", "Monitors", "monitor"];
+        assert_eq!(
+            nearest("ConfigurationConf", words),
+            Some("ConfiguratorConf"),
+            "the fewest slips, not the same beginning"
+        );
+        assert_eq!(nearest("Monitor", words), Some("Monitors"), "a capital that was meant");
+        assert_eq!(nearest("MONITOR", words), Some("Monitors"));
+        assert_eq!(nearest("e_strat", ["e_stop", "e_start"]), Some("e_start"));
+        assert_eq!(nearest("run.udno", ["run", "run.undo"]), Some("run.undo"));
         assert_eq!(nearest("other.Winch", known), None);
         assert_eq!(nearest("arm", ["arm"]), None, "itself is no help");
     }

@@ -113,7 +113,13 @@ impl Session {
         }
         let events = self.events();
         let waited_for = events.iter().map(EventName::as_str).filter(|event| self.may_raise(event).is_ok());
-        did_you_mean(name, "events", waited_for)
+        let inner: Vec<&str> =
+            waited_for.clone().filter(|event| event.rsplit_once('/').is_some_and(|(_, own)| own == name)).collect();
+        match inner.is_empty() {
+            true => did_you_mean(name, "events", waited_for),
+            // It is one of a subsystem, or of several.
+            false => format!("did you mean `{}`?", inner.join("` or `")),
+        }
     }
 
     /// The event that a text from outside names. Asked before it becomes a name: names are kept for ever.

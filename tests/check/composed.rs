@@ -238,7 +238,7 @@ fn a_parent_touches_what_is_exported_and_nothing_else() {
     let help: Vec<&str> = others.iter().filter_map(|finding| finding.help.as_deref()).collect();
     assert!(help.iter().any(|help| help.contains("`exports: { ports: { pose: D.pose } }`")), "{others:#?}");
     let (says, help) = one(&[("pair_conf.lua", pose, "connect('left.pase', 'right.ref')")], "compose::not_exported");
-    assert_eq!((says.as_str(), help.as_str()), ("`left` exports nothing called `pase`", "did you mean `pose`?"));
+    assert_eq!((says.as_str(), help.as_str()), ("`left.pase` is nothing that `left` exports", "did you mean `pose`?"));
     let (says, _) = one(
         &[("pair_conf.lua", "property_set('left.k', 2.0)", "property_set('left.ref', 2.0)")],
         "compose::not_exported",
@@ -325,6 +325,30 @@ fn parameters_are_typed_and_given_once() {
     };
     assert!(value(&[]).contains("left/D.k = 0.7"), "{}", value(&[]));
     assert!(value(&[("left.gain", "1.5")]).contains("left/D.k = 1.5"), "{}", value(&[("left.gain", "1.5")]));
+    // One that is not given, or not as it is to be, is told once, and not by those who read it; a number may be meant as a text.
+    let text = [
+        ("arm.yaml", "type: float, default: 0.5, min: 0.0, max: 2.0", "type: string"),
+        ("arm_conf.lua", "property_set('D.k', gain)", "property_set('D.k', #gain)"),
+    ];
+    let told = |set: &[(&str, &str)]| {
+        let findings = load(&files(&text), "arm.yaml", set).findings;
+        findings.into_iter().map(|finding| finding.help.unwrap_or_default()).collect::<Vec<_>>()
+    };
+    assert_eq!(told(&[]), ["give it (string): `--set gain=…`; or write a `default` where it is declared"]);
+    assert_eq!(told(&[("gain", "3")]), Vec::<String>::new());
+    let misspelt = told(&[("gian", "x")]);
+    assert!(misspelt.len() == 2 && misspelt[1] == "did you mean `gain`?", "{misspelt:?}");
+    let inside = found(&needed);
+    assert!(
+        inside.iter().any(|f| f.help.as_ref().is_some_and(|help| help.contains("`--set right.gain=…`"))),
+        "{inside:#?}"
+    );
+    let unread = [("arm_conf.lua", "property_set('D.k', gain)", "property_set('D.k', 1.0)")];
+    let unread = load(&files(&unread), "arm.yaml", &[]).findings;
+    assert!(
+        unread.iter().any(|f| f.help.as_ref().is_some_and(|help| help.contains("files in YAML read none"))),
+        "{unread:#?}"
+    );
     let wrong = load(&files(&[]), "pair.yaml", &[("left.gian", "1.5")]);
     assert!(wrong.findings.iter().any(|finding| finding.is_error()), "{:?}", wrong.findings);
 }
@@ -366,8 +390,34 @@ fn files_that_do_not_fit_each_other_are_told() {
         found(&acts).into_iter().filter(|f| f.code.0 == "compose::safety").map(|f| f.message).collect();
     assert_eq!(unsafe_in.len(), 2, "{unsafe_in:?}");
     assert!(unsafe_in[0].contains("`e_estop` does not reach `left`"), "{unsafe_in:?}");
-    let unknown = one(&[("pair.lua", "'left/e_start', 'right", "'left/e_strat', 'right")], "coord::unknown_request");
-    assert!(unknown.0.contains("left/e_strat"), "{unknown:?}");
+}
+
+#[test]
+fn what_is_raised_for_a_subsystem_is_among_what_it_accepts_and_what_is_heard_of_it_is_of_one_that_is_there() {
+    let list = "`left` accepts `e_released`, `e_shutdown`, `e_start`";
+    let raised = |to: &str| {
+        one(&[("pair.lua", "'left/e_start', 'right", &format!("'left/{to}', 'right"))], "coord::unknown_request")
+    };
+    for (wrong, near) in [("e_strat", "e_start"), ("e_relased", "e_released"), ("e_shutdonw", "e_shutdown")] {
+        let (says, help) = raised(wrong);
+        assert_eq!(says, format!("`left/{wrong}` is nothing that `left` accepts"));
+        assert_eq!(help, format!("did you mean `left/{near}`? {list}"));
+    }
+    let (_, help) = raised("fold");
+    assert!(help.starts_with(list) && help.contains("`accepts`"), "{help}");
+    let by_itself = [
+        ("arm.yaml", "emits: [", "safety: [e_estop]\nemits: ["),
+        ("pair.lua", "'left/e_start', 'right", "'left/e_estop', 'right"),
+    ];
+    let (_, help) = one(&by_itself, "coord::unknown_request");
+    assert!(help.contains("reaches `left` by itself") && !help.contains("did you mean"), "{help}");
+    let nobody = one(&[("pair.lua", "'left/e_start', 'right", "'lfet/e_start', 'right")], "coord::unknown_request");
+    assert!(nobody.0.contains("no subsystem `lfet`") && nobody.1 == "did you mean `left`?", "{nobody:?}");
+    let (says, help) = one(&[("pair.lua", "events = { 'left/up' }", "events = { 'lfet/up' }")], "compose::unknown");
+    assert_eq!(
+        (says.as_str(), help.as_str()),
+        ("`lfet/up` never comes: there is no subsystem `lfet`", "did you mean `left`?")
+    );
 }
 
 /// Small compositions: a number of children in a row, and a parent that does some of what it should, in some order.

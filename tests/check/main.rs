@@ -20,6 +20,7 @@ mod demands;
 mod exclusive;
 mod flat_plans;
 mod follow;
+mod pointed;
 mod product;
 mod promised;
 mod replayed;

@@ -154,6 +154,18 @@ fn the_demo_is_sound() {
 }
 
 #[test]
+fn what_reading_found_stands_among_what_was_followed_by_what_it_is_worth() {
+    let demo = Demo::new();
+    demo.replace("deployment.yaml", "types:\n", "parameters: { unread: { type: float, default: 1.0 } }\ntypes:\n");
+    // The demo has notes.
+    let json = demo.run(&["check", "deployment.yaml", "--json"]).json();
+    let found: Vec<&str> = json["findings"].as_array().unwrap().iter().filter_map(|f| f["severity"].as_str()).collect();
+    assert!(found.first() == Some(&"warning") && found.contains(&"info"), "{json:#}");
+    let shown = demo.run(&["check", "deployment.yaml"]).err;
+    assert!(shown.contains("⚠ no Lua file reads the parameter `unread`"), "{shown}");
+}
+
+#[test]
 fn every_mistake_is_found_where_it_is() {
     let mut wrong = Vec::new();
     for mistake in MISTAKES {
@@ -252,7 +264,8 @@ fn a_missing_library_and_a_missing_file_are_named() {
     demo.replace("deployment.yaml", "types:\n", "libraries: [youbt]\ntypes:\n");
     let json = demo.run(&["check", "deployment.yaml", "--json"]).json();
     assert_eq!(json["findings"][0]["code"], "deploy::unknown_library");
-    assert!(json["findings"][0]["help"].as_str().unwrap().contains("`youbot`"));
+    let help = json["findings"][0]["help"].as_str().unwrap();
+    assert!(help.contains("`youbot`") && help.contains("a program of one's own"), "{help}");
     let demo = Demo::new();
     let line = demo.replace("deployment.yaml", "[configurations.lua]", "[configuration.lua]");
     let ran = demo.run(&["check", "deployment.yaml", "--json"]);
@@ -274,5 +287,16 @@ fn of_a_file_that_is_not_there_it_is_said_which_are() {
     demo.write("empty/deployments/arm.yaml", "");
     let below = "in the folder empty/deployments: known files: `arm.yaml`";
     assert_eq!(help(&["check", "empty/nope.yaml", "--json"]), below);
+    assert_eq!(
+        help(&["check", "empty/deployments", "--json"]),
+        "name a file in it, such as `empty/deployments/arm.yaml`"
+    );
+    // A file of another kind is told so by every command.
+    let drawn = demo.run(&["graph", "configurations.lua"]);
+    assert!(
+        drawn.err.contains("this is read as a coordinator") && drawn.err.contains("deployments/NAME.yaml"),
+        "{}",
+        drawn.err
+    );
     assert_eq!(help(&["check", "empty/none/nope.yaml", "--json"]), "there is no folder empty/none either");
 }

@@ -477,6 +477,22 @@ fn what_an_operator_put_on_a_subsystem_goes_when_that_is_led_down_alone() {
     assert_eq!(ran.code, 0, "{}{}", ran.out, ran.err);
 }
 
+/// What a script asks for that is nowhere is told with what there is of that name in subsystems.
+#[test]
+fn an_event_and_a_state_that_are_nowhere_are_told_with_those_of_subsystems() {
+    let demo = cell();
+    for (line, says) in [
+        ("raise('Drive.faulted')", "did you mean `left/Drive.faulted` or `right/Drive.faulted`?"),
+        ("wait_state('lfet:on', 1)", "there is no coordinator `lfet` that could be in `lfet:on`: did you mean `left`?"),
+        ("wait_state('left:no', 1)", "has no state `left:no`: known states: "),
+    ] {
+        demo.write("story.lua", &format!("deploy('pair.yaml') {line}"));
+        let ran = demo.run(&["run", "story.lua", "--clock", "simulated", "--quiet"]);
+        let said: Vec<&str> = ran.err.split_whitespace().filter(|word| *word != "│").collect();
+        assert!(ran.code == 1 && said.join(" ").contains(says), "{line}: {}{}", ran.out, ran.err);
+    }
+}
+
 /// Leads each of the pair by a coordinator of its own.
 pub fn apart(demo: &Demo) {
     demo.write(

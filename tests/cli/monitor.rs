@@ -162,7 +162,7 @@ fn what_is_wrong_with_a_recording_has_its_place() {
         (header.to_owned(), "samples::empty", 1, 1, "holds the samples"),
         ("t,a\n".to_owned(), "samples::columns", 1, 1, "`time`"),
         ("time;Dynamics.f_raw_norm\n".to_owned(), "samples::columns", 1, 1, "commas"),
-        ("time,Dynamics.f_norm,Link.stats\n0,1,1\n".to_owned(), "samples::missing", 1, 1, "`Dynamics.f_norm`"),
+        ("time,Dynamics.f_norm,Link.stats\n0,1,1\n".to_owned(), "samples::missing", 1, 6, "`Dynamics.f_norm`"),
         (format!("{header}0,1,1\n0.1,1x,1\n"), "samples::bad_number", 3, 5, "number"),
         (format!("{header}0,1,1\n\n0.1 s,1,1\n"), "samples::bad_time", 4, 1, "seconds"),
         (format!("{header}0,1,1\n,1,1\n"), "samples::bad_time", 3, 1, "seconds"),

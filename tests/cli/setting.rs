@@ -104,6 +104,7 @@ fn what_is_not_listed_needs_force_and_the_gates_are_those_of_apply() {
         (&["set", "source.k", "11", "--force"][..], 1, "10"),
         (&["set", "source.k", "-1", "--force"], 1, "source.k.failed"),
         (&["set", "source.mode", "1", "--force"], 1, "source.mode.failed"),
+        (&["set", "source.k", "1e400", "--force"], 2, "`1e400` is no finite number"),
         (&["set", "source.k", "fast", "--force"], 1, "`source.k` is a float"),
         (&["set", "sink.limits", "[1]", "--force"], 1, "expected 2 elements"),
         (&["set", "sink.u", "1", "--force"], 1, "sink.u.failed"),

@@ -69,6 +69,8 @@ fn what_is_not_read_or_not_written_so_is_named() {
         assert!(said.join(" ").contains(says), "{set}: {}{}", ran.out, ran.err);
     }
     let demo = Demo::new();
+    let ran = demo.run(&["sweep", "plian.lua", "--set", "k=1,2"]);
+    assert!(ran.code == 2 && ran.err.contains("there is no file plian.lua"), "{}{}", ran.out, ran.err);
     demo.write("plain.lua", "param('k', 1) say('ran')");
     let ran = demo.run(&["run", "plain.lua", "--set", "kay=2"]);
     assert!(ran.code == 2 && ran.err.contains("script::unknown_parameter"), "{}{}", ran.out, ran.err);

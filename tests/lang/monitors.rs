@@ -200,6 +200,8 @@ fn mistakes_in_lua() {
                 "monitor::unnamed 3:1",
                 "name = monitor",
             ),
+            ("Monitors {", "Monitor {", "lua::undefined 3:1", "`Monitors`"),
+            ("above(age(\"Link_Rx.link_stats\"), 0.1)", "above('Link_Rx.x' > 0.1)", "lua::error 11:5", "`below(…)`"),
             ("Monitors {", "local x = faulted('A')\nMonitors {", "lua::unused 3:11", "in no monitor"),
         ],
     );

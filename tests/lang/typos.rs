@@ -56,7 +56,7 @@ fn deployment_keys_names_and_values() {
         ("type: float, unit", "type: flaot, unit", "type::bad_type 7:33", "`float`"),
         ("default: 1.0", "default: 11.0", "type::bad_default 10:34", "11"),
         ("default: 1.0", "default: one", "type::bad_default 10:34", "expected float"),
-        ("min: 0.0", "min: 20.0", "type::bad_default 10:7", "exchange"),
+        ("min: 0.0", "min: 20.0", "type::bad_default 10:39", "exchange"),
         ("tunable: stopped", "tunable: stoped", "text::bad_value 10:69", "`stopped`"),
         ("effect: none", "effect: non", "text::bad_value 12:54", "`none`"),
         ("args: [float]", "args: float", "text::wrong_type 12:22", "args: [float, int]"),
@@ -137,6 +137,8 @@ ConfiguratorConf {
 fn configurations_in_lua() {
     let table = [
         ("ConfiguratorConf {", "ConfiguratorCnf {", "lua::undefined 1:1", "`ConfiguratorConf`"),
+        ("ConfiguratorConf {", "ConfigurationConf {", "lua::undefined 1:1", "`ConfiguratorConf`"),
+        ("timeout = 0.5", "timeout = timeout", "lua::undefined 2:34", "local timeout"),
         ("= Configuration {", "= Configuraton {", "lua::undefined 2:8", "`Configuration`"),
         ("timeout =", "timout =", "text::unknown_key 2:24", "`timeout`"),
         ("timeout = 0.5", "timeout = '500ms'", "text::bad_time 2:34", "timeout = 0.5"),

@@ -44,6 +44,13 @@ pub(super) fn wait_done(host: &SharedHost, request: RequestId, seconds: f64) -> 
 pub(super) fn wait_state(host: &SharedHost, state: &str, seconds: f64) -> mlua::Result<()> {
     let deployed = session(host)?;
     if !deployed.knows_state(state) {
+        let names = deployed.coordinators();
+        if let Some((of, _)) = state.split_once(':')
+            && names.iter().all(|name| name.as_str() != of)
+        {
+            let help = did_you_mean(of, "coordinators", names.iter().map(|name| name.as_str()));
+            return Err(error(format!("there is no coordinator `{of}` that could be in `{state}`: {help}")));
+        }
         let states = deployed.states();
         let own = state.rsplit(['.', ':']).next().unwrap_or(state);
         let help = did_you_mean(own, "states", states.iter().map(String::as_str));

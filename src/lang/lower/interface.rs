@@ -6,7 +6,7 @@ use crate::lang::grammar::{EXPORTS, LEAVING, PARAMETER, SUBSYSTEM};
 use crate::lang::tree::{Cx, Entry, Fields, Kind, Node};
 use crate::model::{
     EventName, Export, Finding, Ident, Interface, LeavingRule, MemberClass, MemberRef, Origin, PropertyType, Tunable,
-    codes,
+    ValueType, codes,
 };
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -121,13 +121,13 @@ fn subsystem(cx: &mut Cx, own: Ident, entry: Entry) -> Option<SubsystemDraft> {
     Some(SubsystemDraft { name: own, file: file?, named_at, parameters, activities, origin: entry.origin })
 }
 
-/// Values of parameters as the Lua files read them: those that are given, and the defaults of the others. `of`: who gives them, for
-/// messages.
+/// Values of parameters as the Lua files read them: those that are given, and the defaults of the others. For messages: who gives them
+/// (`of`), and what stands before their names on the command line.
 pub fn given(
     cx: &mut Cx,
     declared: &BTreeMap<Ident, PropertyType>,
     mut given: Vec<Entry>,
-    of: &str,
+    (of, within): (&str, &str),
     at: Origin,
 ) -> Vec<Entry> {
     let mut values = Vec::new();
@@ -140,11 +140,15 @@ pub fn given(
             } else {
                 let message = format!("{of} does not give the parameter `{name}`, which has no default");
                 let finding = Finding::error(codes::COMPOSE_PARAMETER, message).at(at);
-                cx.report(
-                    finding
-                        .also(parameter.origin, "declared here")
-                        .help(format!("give it ({}), or write a `default` where it is declared", parameter.ty)),
-                );
+                let there = match within {
+                    "" => String::new(),
+                    _ => format!("`parameters: {{ {name}: … }}` there, or "),
+                };
+                let ty = &parameter.ty;
+                cx.report(finding.also(parameter.origin, "declared here").help(format!(
+                    "give it ({ty}): {there}`--set {within}{name}=…`; or write a `default` where it is declared"
+                )));
+                values.push(lost(*name, parameter.origin));
             }
             continue;
         };
@@ -154,9 +158,14 @@ pub fn given(
             Ok(is) => values.push(Entry { key: name.to_string().into(), origin, value: node_of(&is, place) }),
             Err(error) => {
                 let finding = Finding::error(codes::COMPOSE_PARAMETER, format!("the parameter `{name}`: {error}"));
-                cx.report(
-                    finding.at(place).also(parameter.origin, "declared here").help("give a value that it allows"),
-                );
+                let quotes = if parameter.ty == ValueType::Str {
+                    ", in quotes (`\"3\"`) where it looks like another"
+                } else {
+                    ""
+                };
+                let help = format!("give a value that it allows: {}{quotes}", parameter.ty);
+                cx.report(finding.at(place).also(parameter.origin, "declared here").help(help));
+                values.push(lost(*name, place));
             }
         }
     }
@@ -167,6 +176,11 @@ pub fn given(
         cx.report(Finding::error(codes::COMPOSE_PARAMETER, message).at(entry.origin).help(help));
     }
     values
+}
+
+/// One that has no value, which is said: files that read it are not at fault.
+fn lost(name: Ident, origin: Origin) -> Entry {
+    Entry { key: name.to_string().into(), origin, value: Node::new(Kind::Poison, origin) }
 }
 
 fn node_of(of: &crate::model::Value, origin: Origin) -> Node {

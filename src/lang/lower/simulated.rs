@@ -28,7 +28,8 @@ fn reaction(cx: &mut Cx, node: Node) -> Option<SimulatedReaction> {
     let component = fields.name(cx, "component");
     let delay = fields.written(cx, "delay_s", Fields::time);
     fields.finish(cx);
-    let (after, origin) = after?;
+    // What is wrong may be in any of its keys.
+    let (after, _) = after?;
     Some(SimulatedReaction {
         after,
         delay: delay.unwrap_or(Some(std::time::Duration::ZERO))?,

@@ -186,6 +186,8 @@ pub fn to_lua(lua: &Lua, node: &Node) -> mlua::Result<Value> {
             }
             Value::Table(table)
         }
+        // What it was to be could not be read, and that is said.
+        Kind::Poison => poison(),
         _ => Value::Nil,
     })
 }

@@ -100,6 +100,11 @@ impl Recorder {
         self.cx.sources.within(line, word)
     }
 
+    /// The place of a name on a line where its value is asked for.
+    pub fn read_at(&mut self, line: u32, name: &str) -> Origin {
+        self.cx.sources.read(self.reading.file, line, name)
+    }
+
     /// Records what a constructor made; answers its number.
     pub fn record(&mut self, verb: &'static str, origin: Origin, node: Node) -> usize {
         self.made.push(Recorded { verb, origin, node: Some(node), uses: 0 });
@@ -199,7 +204,15 @@ impl Recorder {
                 return;
             }
             let finding = Finding::error(codes::LUA_ERROR, format!("the file fails: {message}")).at(at);
-            self.cx.report(finding.help("the message is Lua's own; the file must run to its end once, without errors"));
+            // `above("A.x" > limit)`: both sides are there at once, and one is only the name of a signal.
+            let help = match message.contains("attempt to compare") {
+                true => {
+                    "in Lua that is true or false at once; a signal is compared by words that take it and the bound: \
+                     `above(\"A.x\", 2.0)`, `below(…)`, `at_most(…)` or `at_least(…)`"
+                }
+                false => "the message is Lua's own; the file must run to its end once, without errors",
+            };
+            self.cx.report(finding.help(help));
         }
     }
 }

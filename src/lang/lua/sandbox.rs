@@ -10,6 +10,7 @@ use super::budget::{charge, known_metatables};
 use super::convert;
 use super::recorder::SharedRecorder;
 use crate::functions;
+use crate::lang::tree::Kind;
 use crate::limits;
 use crate::model::finding::{did_you_mean, nearest};
 use crate::model::{Finding, codes};
@@ -231,7 +232,10 @@ pub fn undefined(lua: &Lua, shared: &SharedRecorder, table: &Table, prefix: &str
             let mut recorder = recorder.borrow_mut();
             if let Some(param) = recorder.params.all.iter_mut().find(|p| p.name == name) {
                 param.used = true;
-                let value = convert::to_lua(lua, &param.value)?;
+                let (value, lost) = (convert::to_lua(lua, &param.value)?, matches!(param.value.kind, Kind::Poison));
+                if lost {
+                    recorder.undefined.insert(name.clone());
+                }
                 table.raw_set(key, value.clone())?;
                 return Ok(value);
             }
@@ -249,7 +253,10 @@ pub fn undefined(lua: &Lua, shared: &SharedRecorder, table: &Table, prefix: &str
         known.sort();
         let mut recorder = recorder.borrow_mut();
         known.extend(recorder.params.all.iter().map(|p| p.name.clone()).filter(|_| prefix.is_empty()));
-        let origin = recorder.word_at(line, &name);
+        let origin = match prefix.is_empty() {
+            true => recorder.read_at(line, &name),
+            false => recorder.word_at(line, &name),
+        };
         let finding = match CLOSED.iter().find(|(closed, _)| *closed == full) {
             Some((_, why)) => Finding::error(codes::LUA_CLOSED, format!("`{full}` is not there: {why}"))
                 .at(origin)
