@@ -11,6 +11,7 @@ mod commands;
 mod crowded;
 mod declared;
 mod demo;
+mod drawn;
 mod endless;
 mod endurance;
 mod explored;
