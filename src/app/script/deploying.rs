@@ -58,6 +58,10 @@ pub(super) fn deploy(host: &SharedHost, file: &str, options: Option<Table>) -> m
     if clock.is_simulated() {
         session.unattended();
     }
+    // On a way it is let go when the script says so: `check` follows that as an event from outside.
+    if replay {
+        session.played_by_parent();
+    }
     // A replay raises the events itself.
     match if replay { Ok(()) } else { session.bring_up() } {
         Ok(()) => {
