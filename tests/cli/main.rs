@@ -8,6 +8,7 @@ mod booked;
 mod breakages;
 mod budget;
 mod commands;
+mod contradicting;
 mod crowded;
 mod declared;
 mod demo;
