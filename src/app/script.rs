@@ -60,12 +60,12 @@ pub struct ScriptOptions {
     pub say: Box<dyn Fn(&str)>,
     /// By what somebody outside stops it.
     pub interrupt: Interrupt,
-    /// Makes a deployment on the real clock known under its name, until it is down; or says why that cannot be.
+    /// Makes a deployment on the real clock, of that file, known under its name, until it is down; or says why that cannot be.
     pub door: Option<Door>,
 }
 
 /// See [`ScriptOptions::door`].
-pub type Door = Box<dyn Fn(&Arc<Session>) -> Result<Box<dyn Any>, String>>;
+pub type Door = Box<dyn Fn(&Arc<Session>, &Path) -> Result<Box<dyn Any>, String>>;
 
 /// How a script ended.
 #[derive(Debug)]

@@ -10,7 +10,9 @@ use super::progress::ProgressView;
 use super::signals::SignalWatch;
 use super::{CommandContext, CommandFailure, CommandResult, Run};
 use crate::app::{self, Checked, StartError};
-use crate::model::codes::{CLI_NAME_TAKEN, CLI_SYSTEM, DEPLOY_NO_PLATFORM, FUNCTIONS_NOT_OPENED, TYPE_DIFFERS};
+use crate::model::codes::{
+    CLI_CONTRADICTS, CLI_NAME_TAKEN, CLI_SYSTEM, DEPLOY_NO_PLATFORM, FUNCTIONS_NOT_OPENED, TYPE_DIFFERS,
+};
 use crate::model::finding::count;
 use crate::session::kept::Leave;
 use crate::session::place;
@@ -44,9 +46,9 @@ pub struct Args {
     /// `--pace`.
     #[arg(long, value_enum, default_value_t, value_name = "CLOCK")]
     clock: ClockKind,
-    /// Simulated seconds in one real second; 0: as fast as the machine.
-    #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = super::remote::seconds)]
-    pace: f64,
+    /// With `--clock simulated`: simulated seconds in one real second; 0: as fast as the machine [default: 1].
+    #[arg(long, value_name = "FACTOR", value_parser = super::remote::seconds)]
+    pace: Option<f64>,
     /// Print every event of the story as one JSON object a line.
     #[arg(long)]
     json: bool,
@@ -78,6 +80,13 @@ impl ClockKind {
 
 impl Run for Args {
     fn run(self, context: &CommandContext) -> CommandResult {
+        if self.pace.is_some() && self.clock == ClockKind::Real {
+            return Err(CommandFailure::usage(
+                CLI_CONTRADICTS,
+                "`--pace` is about simulated time, and this runs on the real clock",
+                "add `--clock simulated`, or leave `--pace` out",
+            ));
+        }
         if self.detach {
             return detach::run(context);
         }
@@ -88,7 +97,7 @@ impl Run for Args {
 impl Args {
     fn deploy(&self, context: &CommandContext) -> CommandResult {
         let checked = self.input.check(context)?;
-        let clock = self.clock.make(self.pace);
+        let clock = self.clock.make(self.pace.unwrap_or(1.0));
         let progress = ProgressView::new(context.out, self.json, &clock).map_err(short)?;
         let exit = self.foreground(context, &checked, &clock, &progress)?;
         clock.shutdown();
@@ -204,7 +213,14 @@ pub(super) fn open(session: &Arc<Session>) -> Result<ControlSocket, CommandFailu
 }
 
 /// What a process does that ends at once, the last first.
-type Leaving = Arc<Mutex<Vec<Leave>>>;
+pub(super) type Leaving = Arc<Mutex<Vec<Leave>>>;
+
+/// Does it.
+pub(super) fn leave(leaving: &Leaving) {
+    for leave in lock(leaving).drain(..).rev() {
+        leave();
+    }
+}
 
 fn watch(
     session: &Arc<Session>,
@@ -224,9 +240,7 @@ fn watch(
     let leave = {
         let (leaving, progress) = (leaving.clone(), progress.clone());
         move || {
-            for leave in lock(&leaving).drain(..).rev() {
-                leave();
-            }
+            self::leave(&leaving);
             progress.finish();
         }
     };

@@ -11,7 +11,7 @@ use crate::check::Until;
 use crate::diagnostics::Language;
 use crate::draw::{self, ComponentsView, DrawnPlan, PlacedCoordinator};
 use crate::lang;
-use crate::model::codes::CLI_FORMAT_OF_COORDINATORS;
+use crate::model::codes::{CLI_CONTRADICTS, CLI_FORMAT_OF_COORDINATORS};
 use crate::model::finding::count;
 use crate::model::program::AuxiliaryFunction;
 use crate::model::{Findings, Ident, Step};
@@ -44,7 +44,7 @@ pub struct Args {
     /// Draw subsystems that are more than N levels deep (0: all of them) as one box each; without it everything is drawn.
     #[arg(long, value_name = "N")]
     depth: Option<usize>,
-    /// Mark the states that are active in the running deployment.
+    /// For coordinators: mark the states that are active in the running deployment.
     #[arg(long)]
     live: bool,
     /// The running deployment's name, if it is not the file's.
@@ -90,6 +90,13 @@ enum Format {
 impl Run for Args {
     fn run(self, context: &CommandContext) -> CommandResult {
         let what = if is_deployment(&self.file) { self.what } else { Drawn::Coordinator };
+        if self.live && what != Drawn::Coordinator {
+            return Err(CommandFailure::usage(
+                CLI_CONTRADICTS,
+                "`--live` marks the active states of coordinators, and none are drawn",
+                "add `--what coordinator`; `davit status` shows components as they are now",
+            ));
+        }
         let picture = if what == Drawn::Coordinator {
             let mut all = coordinators(&self.file, &self.parameters, &self.inside, self.of.as_deref(), &[])?;
             if all.len() > 1 {

@@ -1,4 +1,4 @@
-//! What `davit deploy` keeps on disk of the deployment that it runs.
+//! What `davit deploy` keeps on disk of the deployment that it runs, and `davit run` of those that a script has on the real clock.
 
 use super::CommandFailure;
 use super::deploy::short;

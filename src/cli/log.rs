@@ -132,14 +132,16 @@ impl Args {
         sieve.newest(&told, self.last).iter().for_each(print);
         let mut overlap = Overlap(told);
         let mut phases = Phases::default();
-        while let Some(entry) = client.next_entry() {
-            phases.see(&entry);
-            if overlap.is_news(&entry)
-                && let Some(entry) = sieve.pass(&entry)
-            {
-                print(&entry);
+        while let Ok(next) = client.next_entry() {
+            if let Some(entry) = &next {
+                phases.see(entry);
+                if overlap.is_news(entry)
+                    && let Some(entry) = sieve.pass(entry)
+                {
+                    print(&entry);
+                }
             }
-            if output::arrives_nowhere() {
+            if output::arrives_nowhere() || output::is_unread() {
                 return Ok(Exit::Done);
             }
         }

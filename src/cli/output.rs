@@ -155,6 +155,14 @@ pub fn arrives_nowhere() -> bool {
     READER_GONE.load(Ordering::Relaxed) || unwritten().is_some()
 }
 
+/// Whether nobody reads from stdout any more: for a command that may have nothing to print for long.
+pub fn is_unread() -> bool {
+    let mut poll = libc::pollfd { fd: libc::STDOUT_FILENO, events: 0, revents: 0 };
+    // SAFETY: one descriptor, which is only looked at, and a list of that length.
+    let ready = unsafe { libc::poll(&raw mut poll, 1, 0) };
+    ready > 0 && poll.revents & (libc::POLLERR | libc::POLLHUP) != 0
+}
+
 #[derive(Clone, Copy)]
 enum Stream {
     Out,

@@ -1,9 +1,10 @@
 //! `davit run`
 
-use super::deploy::ClockKind;
+use super::deploy::{ClockKind, Leaving};
 use super::exit::Exit;
 use super::figures;
 use super::input::Parameters;
+use super::keep::Keep;
 use super::last_words;
 use super::output::Style;
 use super::progress::ProgressView;
@@ -17,9 +18,12 @@ use crate::model::codes::{
     DEPLOY_UNKNOWN_PLATFORM, SCRIPT_FAILED, SCRIPT_MISSED, SCRIPT_SYNTAX, SCRIPT_UNKNOWN_PARAMETER,
 };
 use crate::model::finding::did_you_mean;
-use crate::time::Clock;
+use crate::session::Session;
+use crate::session::socket::ControlSocket;
+use crate::time::{Clock, lock};
 use serde_json::json;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// Run a script: deploy, raise events, wait for states and answers with time limits, measure, assert, undo, shut down.
 ///
@@ -28,7 +32,8 @@ use std::path::PathBuf;
 ///
 /// Whatever the script does or fails to do, the deployment it brought up is shut down before the command ends, in the stages of
 /// `davit shutdown`; so it is at Ctrl-C, which ends the script. On the real clock it has its name while it is up, like one of `davit
-/// deploy`: `davit status` and `davit event` reach it, and `davit shutdown` ends the script, too. The functions a script may call are described in
+/// deploy`: `davit status` and `davit event` reach it, and `davit shutdown` ends the script, too; and what happens is kept like
+/// that of one. The functions a script may call are described in
 /// docs/scripts.md.
 ///
 /// Exit status: 0 it ran to its end; 1 it failed, missed a figure or was interrupted; 2 it cannot be read; 4 what it brought up was shut down
@@ -72,9 +77,10 @@ impl Run for Args {
             })
         };
         let interrupt = Interrupt::default();
+        let leaving = Leaving::default();
         let watch = {
             let (stopped, left) = (progress.clone(), progress.clone());
-            let stops = interrupt.clone();
+            let (stops, leaving) = (interrupt.clone(), leaving.clone());
             let stop = move |force| {
                 stops.stop(force);
                 stopped.line(signals::told(force));
@@ -83,7 +89,11 @@ impl Run for Args {
                 let interrupt = interrupt.clone();
                 move || interrupt.waits_to_be_forced()
             };
-            SignalWatch::start(false, stop, held, move || left.finish()).map_err(super::deploy::unwatched)?
+            let leave = move || {
+                super::deploy::leave(&leaving);
+                left.finish();
+            };
+            SignalWatch::start(false, stop, held, leave).map_err(super::deploy::unwatched)?
         };
         let end = script::run(
             &self.script,
@@ -95,7 +105,7 @@ impl Run for Args {
                 observer: (!self.quiet).then(|| progress.observer()),
                 say,
                 interrupt,
-                door: Some(door(&clock)),
+                door: Some(door(&clock, &leaving)),
             },
         );
         clock.shutdown();
@@ -139,16 +149,42 @@ fn measured(context: &CommandContext, progress: &ProgressView, end: &ScriptEnd) 
     }
 }
 
-/// On the real clock a script's deployment has its name and its socket like every other: nobody else commands the same robot, and
-/// who stands beside it can stop it.
-fn door(clock: &Clock) -> Door {
-    let clock = clock.clone();
-    Box::new(move |session| {
+/// On the real clock a script's deployment has its name and its socket like every other, and is kept: nobody else commands the same
+/// robot, who stands beside it can stop it, and who finds it abandoned is told.
+fn door(clock: &Clock, leaving: &Leaving) -> Door {
+    let (clock, leaving) = (clock.clone(), leaving.clone());
+    Box::new(move |session, file| {
         let words = |failure: CommandFailure| failure.message();
         let socket = super::deploy::open(session).map_err(words)?;
+        lock(&leaving).push(Box::new(socket.leave()));
         session.hub().attach(socket.observer(&clock).map_err(super::deploy::short).map_err(words)?);
-        Ok(Box::new(socket))
+        let keep = Keep::begin(session, file, &clock, false).map_err(words)?;
+        lock(&leaving).extend(keep.leave());
+        Ok(Box::new(KnownDeployment {
+            keep: Some(keep),
+            session: session.clone(),
+            leaving: leaving.clone(),
+            _socket: socket,
+        }))
     })
+}
+
+/// A script's deployment as others know it, as long as it is up.
+struct KnownDeployment {
+    keep: Option<Keep>,
+    session: Arc<Session>,
+    leaving: Leaving,
+    _socket: ControlSocket,
+}
+
+impl Drop for KnownDeployment {
+    /// How it ended is written before its name is free.
+    fn drop(&mut self) {
+        if let (Some(keep), Some(ended)) = (self.keep.take(), self.session.ended()) {
+            keep.ended(&ended);
+        }
+        lock(&self.leaving).clear();
+    }
 }
 
 /// A platform of this program.

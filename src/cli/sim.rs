@@ -23,7 +23,8 @@ use std::sync::Arc;
 /// each with the number of actions before it.
 ///
 /// One line is one set of events, separated by blanks, queued in the order written and followed by one step; an empty
-/// line queues nothing; the first line also enters the machine. A line `run` runs to idle; `advance 0.5` moves the clock
+/// line queues nothing. The first line enters the machine, and events on it are lost with that step, as rFSM has it: begin with
+/// `run` or an empty line. A line `run` runs to idle; `advance 0.5` moves the clock
 /// by half a second and does one step. At a terminal: Tab completes, `undo` takes lines back, `help` lists the rest.
 #[derive(Debug, clap::Args)]
 pub struct Args {

@@ -103,6 +103,11 @@ impl DiagramEdge {
     pub fn new(from: usize, to: usize) -> Self {
         Self { from, from_port: None, to, to_port: None, label: Vec::new(), dashed: false }
     }
+
+    /// Whether it is about ports: it leaves at the side of the out-ports and comes in at that of the in-ports, whichever way it runs.
+    pub(super) fn is_of_ports(&self) -> bool {
+        self.from_port.is_some() || self.to_port.is_some()
+    }
 }
 
 /// Nodes and edges with all they look like, but no coordinates.

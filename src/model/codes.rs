@@ -793,6 +793,9 @@ codes! {
          right is for a person to decide. Say one of them; `davit drift` shows what differs.";
     CLI_FORMAT_OF_COORDINATORS = "cli::format_of_coordinators", "the format is one of coordinators only",
         "PlantUML, SCXML and rFSM's JSON have a form for statecharts and none for components or plans. Ask for `--what coordinator`, or for a picture.";
+    CLI_CONTRADICTS = "cli::contradicts", "two options do not go together",
+        "An option was given that says nothing beside what else was asked for: `--live` marks active states, which only a picture of \
+         coordinators has; `--pace` is about simulated time, and real time goes by as it does. Leave one of the two out.";
     CLI_UNKNOWN_CODE = "cli::unknown_code", "there is no finding with this code",
         "`davit explain` was asked about a code that no finding carries. Codes are printed with every finding, as \
          `davit::area::name`; the leading `davit::` may be left out. `davit explain` without a code lists all of them.";

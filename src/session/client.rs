@@ -195,16 +195,23 @@ impl Client {
     pub fn subscribe(&mut self, limit: Duration) -> Result<(), ClientError> {
         self.call("subscribe", &Json::Null, limit)?;
         let io = |source| ClientError::Io { name: self.name.clone(), source };
-        self.reader.get_ref().set_read_timeout(None).map_err(io)
+        self.reader.get_ref().set_read_timeout(Some(limits::FOLLOW_LOOK)).map_err(io)
     }
 
-    /// The next thing that happens, waiting for it as long as the deployment lives; none: it does not any more, or the
-    /// connection was cut off since too much waited to be read.
-    pub fn next_entry(&mut self) -> Option<Json> {
+    /// The next thing that happens; none: nothing has for [`limits::FOLLOW_LOOK`].
+    ///
+    /// # Errors
+    /// When the deployment does not live any more, or the connection was cut off since too much waited to be read.
+    pub fn next_entry(&mut self) -> io::Result<Option<Json>> {
         loop {
-            let mut json = self.read().ok()?;
+            let mut json = match self.read() {
+                Err(quiet) if matches!(quiet.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut) => {
+                    return Ok(None);
+                }
+                read => read?,
+            };
             if json.get("method").and_then(Json::as_str) == Some("log") {
-                return Some(json["params"].take());
+                return Ok(Some(json["params"].take()));
             }
         }
     }

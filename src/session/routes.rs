@@ -36,6 +36,8 @@ pub(super) struct Junction {
     pub subsystems: Option<Arc<Subsystems>>,
     /// What it says before it leaves, and what it waits for then: it has no parent that would let it go.
     leaving: Option<(EventName, EventName)>,
+    /// Somebody plays its parent, and lets it go.
+    pub has_parent: AtomicBool,
     /// Nobody drives it any more.
     closed: AtomicBool,
     /// Held while an event is given to several coordinators: what one of them tells the others of it comes behind it everywhere.
@@ -319,7 +321,8 @@ impl ToConfigurator {
         if self.hub.is_stopping() && junction.begins(event) {
             return;
         }
-        if let Some((_, until)) = junction.leaving.filter(|(says, _)| *says == event) {
+        let alone = !junction.has_parent.load(Ordering::Acquire);
+        if let Some((_, until)) = junction.leaving.filter(|(says, _)| alone && *says == event) {
             junction.give_all(&self.hub, Class::Report, until);
         }
         let others: Vec<CoordinatorHandle> = lock(&junction.coordinators)

@@ -51,10 +51,17 @@ impl Session {
         self.attended.store(false, Ordering::Relaxed);
     }
 
+    /// Whoever drives it plays its parent, too, until it is stopped: with `leaving` it waits for the event under `until`, as a subsystem
+    /// does, instead of being let go at once.
+    pub fn played_by_parent(&self) {
+        self.junction().has_parent.store(true, Ordering::Release);
+    }
+
     /// The same also of a deployment that is being brought up: an event that nobody hears there leads nowhere.
     pub(super) fn stop(&self, force: bool, coming_up: bool) -> Ended {
         let hub = self.hub();
         hub.halt().begin();
+        self.junction().has_parent.store(false, Ordering::Release);
         self.configurator().stopping();
         let _ = survived(|| hub.set_phase(Phase::ShuttingDown));
         let mut told = Announced { stage: Stage::Led, notes: Vec::new(), coming_up };

@@ -89,8 +89,8 @@ impl<'c, F: Hook> Sim<'c, F> {
     }
 
     /// Does what a line says: `run` runs to idle; `advance 0.5` moves the clock by half a second and does one step; any
-    /// other line is a set of events separated by blanks, queued in that order, and one step. The first line also
-    /// enters the machine.
+    /// other line is a set of events separated by blanks, queued in that order, and one step. The first line enters
+    /// the machine, which loses the events that stand on it.
     ///
     /// # Errors
     /// [`SimError`] for a line that says none of these; the machine is as before.
@@ -120,10 +120,13 @@ impl<'c, F: Hook> Sim<'c, F> {
                 let events: Vec<EventId> =
                     names.iter().map(|name| self.functions.event(self.machine.chart(self.chart), *name)).collect();
                 lost = events.into_iter().filter(|event| !self.machine.send(*event)).count();
+                let enters = self.machine.leaf().is_none();
                 let mut hook = Watched { watcher: &mut trace, functions: &mut self.functions };
                 let stepped = self.machine.step(self.chart, self.now, 1, &mut hook);
                 if !stepped.transition {
                     self.remark_unknown(&names, &mut trace);
+                } else if enters {
+                    self.remark_entered(&names, &mut trace);
                 }
                 stepped
             }
@@ -153,6 +156,29 @@ impl<'c, F: Hook> Sim<'c, F> {
         let near = nearest(last, chart.events().iter().map(EventName::as_str)).filter(|_| unknown.len() == 1);
         let near = near.map(|near| format!("; did you mean `{near}`?")).unwrap_or_default();
         trace.note(format!("no transition lists `{}`{more}{near}", unknown.join("`, `")));
+    }
+
+    /// What stands in the set of the step that enters is lost with it (rFSM), but for what a path through connectors looks at.
+    fn remark_entered(&self, names: &[EventName], trace: &mut SimTrace) {
+        let chart = self.chart();
+        let connectors = || chart.nodes().filter(|node| !chart.is_state(*node));
+        let looked_at = |event| {
+            connectors()
+                .flat_map(|node| chart.outgoing(node))
+                .any(|edge| chart.triggers(edge).is_some_and(|triggers| triggers.contains(&event)))
+        };
+        let lost = names.iter().filter(|name| name.as_str() != "e_init_fsm" && !looked_at(chart.event(**name)));
+        let mut lost: Vec<&str> = lost.map(EventName::as_str).collect();
+        if lost.is_empty() {
+            return;
+        }
+        let are = if lost.len() == 1 { "is" } else { "are" };
+        let more = if lost.len() > UNKNOWN_SHOWN { " and others" } else { "" };
+        lost.truncate(UNKNOWN_SHOWN);
+        let lost = lost.join("`, `");
+        trace.note(format!(
+            "`{lost}`{more} {are} lost: this step enters the machine; give events from the next line on"
+        ));
     }
 
     fn observe(&mut self, stepped: Stepped, mut trace: SimTrace) -> Observation {

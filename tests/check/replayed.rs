@@ -177,3 +177,38 @@ fn what_nobody_has_heard_yet_is_raised_all_the_same() {
     let ran = small.demo.run(&["run", "way.lua", "--clock", "simulated", "--platform", "simulated"]);
     assert!(!ran.err.contains("davit::script"), "{}{}", ran.out, ran.err);
 }
+
+/// A file with `leaving` that runs alone is let go by itself: not on a way, where the event that lets it go comes when the script says so.
+#[test]
+fn what_lets_a_part_go_comes_when_it_does_on_the_way() {
+    let conf = "make = Configuration { create('a', 'Drive'), post_conf_state = { 'a:stopped' } },
+                run = Configuration { post_conf_state = { 'a:running' } }";
+    let coordinator = "idle = state {}, making = state { entry = 'make' }, starting = state { entry = { 'e_built', 'run' } }, up = state {},
+        undone = state {}, leaving = state { entry = 'e_leaving' },
+        stopping = state { entry = 'run.undo' }, removing = state { entry = 'make.undo' },
+        trans { src = 'initial', tgt = 'idle' },
+        trans { src = 'idle', tgt = 'making', events = { 'e_start' } },
+        trans { src = 'making', tgt = 'starting', events = { 'make.ok' } },
+        trans { src = 'starting', tgt = 'up', events = { 'run.ok' } },
+        trans { src = 'making', tgt = 'undone', events = { 'make.failed', 'make.broken' } },
+        trans { src = 'starting', tgt = 'undone', events = { 'run.failed', 'run.broken' } },
+        trans { src = 'up', tgt = 'leaving', events = { 'e_shutdown', 'a.faulted' } },
+        trans { src = 'undone', tgt = 'leaving', events = { 'e_shutdown' } },
+        trans { src = 'leaving', tgt = 'stopping', events = { 'e_released' } },
+        trans { src = 'stopping', tgt = 'removing', events = { 'run.undone' } },
+        trans { src = 'removing', tgt = 'idle', events = { 'make.undone' } },
+        trans { src = 'removing', tgt = 'undone', events = { 'make.undo.failed', 'make.undo.broken' } },";
+    let keys = "exports: { ports: { out: a.out }, from: e_built }
+accepts: [e_released]
+emits: [e_built, e_leaving]
+leaving: { says: e_leaving, until: e_released }\n";
+    let small = Small::new(conf, coordinator, keys);
+    let said = small.check();
+    all_go(&small, &said);
+    let ways =
+        (1..=said.0["findings"].as_array().unwrap().len()).map(|number| small.demo.path(&format!("way{number}.lua")));
+    let texts: Vec<String> = ways.filter_map(|way| std::fs::read_to_string(way).ok()).collect();
+    let waits =
+        |text: &String| text.contains("raise(\"e_released\")") && text.contains("wait_answer(\"run.undo.failed\", 0)");
+    assert!(texts.iter().any(waits), "{:#}{texts:#?}", said.0);
+}

@@ -233,3 +233,16 @@ fn an_answer_is_given_by_nobody_else() {
     let said = script.err.split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(said.contains("`slow.failed` is an answer") && said.contains("apply(\"slow\")"), "{said}");
 }
+
+/// Who reads a log that goes on may go while nothing happens.
+#[test]
+fn a_log_that_is_followed_ends_with_its_reader_also_where_nothing_happens() {
+    let (demo, _deployed) = deployed();
+    let mut following = demo.command(&["log", "--follow"]).stdout(Stdio::piped()).spawn().expect("the program starts");
+    let mut line = String::new();
+    let mut reader = BufReader::new(following.stdout.take().expect("a pipe"));
+    reader.read_line(&mut line).expect("a line");
+    drop(reader);
+    let ended = crate::foreground::until("it ends", || following.try_wait().expect("it can be waited for"));
+    assert_eq!(ended.code(), Some(0));
+}

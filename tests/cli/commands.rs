@@ -299,6 +299,26 @@ fn types_are_listed_and_shown() {
     assert!(demo.run(&["types", "deployment.yaml", "--json"]).json().is_array());
 }
 
+/// The step that enters loses what stands in its set, as rFSM has it: that is told, but of what the way in looks at.
+#[test]
+fn sim_tells_of_events_that_are_lost_with_the_first_line() {
+    let demo = Demo::new();
+    let notes = |coordinator: &str, lines: &str| {
+        demo.write("events.txt", lines);
+        let ran = demo.run(&["sim", coordinator, "--events", "events.txt"]);
+        assert_eq!(ran.code, 0, "{}", ran.err);
+        ran.out.lines().filter(|line| line.contains("note: ")).map(str::to_owned).collect::<Vec<_>>()
+    };
+    let lost = notes("coordinator.lua", "e_start e_fast\nrun\n");
+    assert!(lost.len() == 1 && lost[0].contains("`e_start`, `e_fast` are lost"), "{lost:?}");
+    assert_eq!(notes("coordinator.lua", "\ne_start\n"), Vec::<String>::new());
+    assert_eq!(notes("coordinator.lua", "run\ne_start\n"), Vec::<String>::new());
+    let ways = "return state { a = state {}, b = state {},
+        trans { src = 'initial', tgt = 'a', events = { 'e_a' } }, trans { src = 'initial', tgt = 'b', events = { 'e_b' } } }";
+    demo.write("ways.lua", ways);
+    assert_eq!(notes("ways.lua", "e_b\n"), Vec::<String>::new());
+}
+
 #[test]
 fn sim_prints_an_object_for_every_line() {
     let demo = Demo::new();

@@ -133,6 +133,55 @@ fn one_in_the_foreground_is_kept_too_also_when_a_third_signal_ends_it() {
     assert!(listed.out.contains("demo  died"), "{}", listed.out);
 }
 
+/// A script's deployment on the real clock is a robot that others find: what is known of an earlier life says nothing of it.
+#[test]
+fn of_one_that_a_script_had_it_is_told_how_it_ended() {
+    let demo = Demo::new();
+    deploy(&demo, "deployment.yaml");
+    assert_eq!(demo.run(&["shutdown"]).code, 0);
+    demo.write("short.lua", "deploy('deployment.yaml') shutdown()");
+    assert_eq!(demo.run(&["run", "short.lua"]).code, 0);
+    let log = demo.run(&["log", "demo"]);
+    assert!(log.out.contains("event      e_start from") && log.out.contains("ended      down"), "{}", log.out);
+    demo.write("long.lua", "deploy('deployment.yaml') wait(600)");
+    let start = || {
+        let mut command = demo.command(&["run", "long.lua"]);
+        let child = Foreground::start(command.stdout(Stdio::null()).stderr(Stdio::null()));
+        demo.until_phase("up");
+        child
+    };
+    let child = start();
+    assert_eq!(process(&demo, "demo"), child.id());
+    child.signal(libc::SIGKILL);
+    child.end();
+    let status = demo.run(&["status", "demo"]);
+    assert!(status.code == 4 && status.out.contains("killed, or crashed"), "{}{}", status.out, status.err);
+    assert!(status.out.contains("deployment.yaml") && !status.out.contains("long.lua"), "{}", status.out);
+
+    // By its third signal: a step hangs in the way of the force that the second one asks for.
+    demo.replace(
+        "deployment.yaml",
+        "platform: simulated",
+        "faults: [{ step: \"destroy sink\", how: hang }]\nplatform: simulated",
+    );
+    demo.replace("deployment.yaml", "down: idle,      within_s: 5", "down: idle, within_s: 600");
+    demo.write("deployment.yaml", &(demo.read("deployment.yaml") + "limits: { step_timeout_s: 600 }\n"));
+    let child = start();
+    child.signal(libc::SIGINT);
+    demo.until_phase("shutting_down");
+    child.signal_again(libc::SIGINT);
+    until("the second is heard", || {
+        (demo.run(&["status", "--json"]).json()["stopping"]["stage"] == "forced").then_some(())
+    });
+    child.signal_again(libc::SIGINT);
+    assert_eq!(child.end().code(), Some(4));
+    let status = demo.run(&["status", "demo"]);
+    let words = "demo  died  it was ended at once, by a third signal";
+    assert!(status.code == 4 && status.out.contains(words), "{}{}", status.out, status.err);
+    let socket = demo.path("davit/demo.sock");
+    assert!(!socket.exists(), "{}", socket.display());
+}
+
 /// What a process wrote down of itself was damaged, at its beginning or behind it, or something else stands there: that is told,
 /// and neither a death nor an end that there may not have been.
 #[test]

@@ -37,7 +37,7 @@ pub(super) fn deploy(host: &SharedHost, file: &str, options: Option<Table>) -> m
             host.borrow_mut().unread = Some(unread.clone());
             return error(unread);
         }
-        host.borrow_mut().refused = Some((path, Box::new(refused)));
+        host.borrow_mut().refused = Some((path.clone(), Box::new(refused)));
         mlua::Error::external(IsRefused(file.to_owned()))
     })?;
     let clock = clock(host);
@@ -46,7 +46,7 @@ pub(super) fn deploy(host: &SharedHost, file: &str, options: Option<Table>) -> m
     let started = start::start_open(&checked, &clock, played);
     let (session, simulated) = started.map_err(|e: StartError| error(e.to_string()))?;
     if !clock.is_simulated() {
-        let door = host.borrow().options.door.as_ref().map(|open| open(&session)).transpose().map_err(error)?;
+        let door = host.borrow().options.door.as_ref().map(|open| open(&session, &path)).transpose().map_err(error)?;
         host.borrow_mut().door = door;
     }
     host.borrow_mut().faults.up(checked, simulated);
@@ -57,6 +57,10 @@ pub(super) fn deploy(host: &SharedHost, file: &str, options: Option<Table>) -> m
     // There is nobody who is waited for.
     if clock.is_simulated() {
         session.unattended();
+    }
+    // On a way it is let go when the script says so: `check` follows that as an event from outside.
+    if replay {
+        session.played_by_parent();
     }
     // A replay raises the events itself.
     match if replay { Ok(()) } else { session.bring_up() } {

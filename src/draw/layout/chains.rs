@@ -83,7 +83,7 @@ impl Layered {
             let edge = &diagram.edges[e];
             let backwards = rank[a] > rank[b] || a == b;
             let (upper, lower) = if backwards { (b, a) } else { (a, b) };
-            let turning = backwards && edge.from_port.is_some();
+            let turning = backwards && edge.is_of_ports();
             let mut chain = Vec::new();
             let (first, last) = (layer_of(upper), layer_of(lower));
             if turning {

@@ -187,7 +187,7 @@ impl<'a> Levels<'a> {
                 Border { edge: e, item, side, outgoing, stage: 0, labelled: true }
             };
             match (self.item_in(level, edge.from), self.item_in(level, edge.to)) {
-                (Some(a), Some(b)) if a == b && edge.from_port.is_none() => edges.loops.push((e, a)),
+                (Some(a), Some(b)) if a == b && !edge.is_of_ports() => edges.loops.push((e, a)),
                 (Some(a), Some(b)) => edges.inner.push((e, index[&a], index[&b])),
                 (None, Some(item)) => edges.borders.push(border(item, Side::Start)),
                 (Some(item), None) => edges.borders.push(border(item, Side::End)),
@@ -242,7 +242,9 @@ impl<'a> Levels<'a> {
             for (end, outgoing, deep) in [(a, true, edge.from), (b, false, edge.to)] {
                 if end == i && deep != node {
                     let other = if outgoing { b } else { a };
-                    let side = if rank[i] < rank[other] { Side::End } else { Side::Start };
+                    // One that is about ports turns round outside, where it runs backwards.
+                    let end = if edge.is_of_ports() { outgoing } else { rank[i] < rank[other] };
+                    let side = if end { Side::End } else { Side::Start };
                     let (item, stage) = (inside(deep), stage(outgoing));
                     crossing.push(Border { edge: e, item, side, outgoing, stage, labelled: false });
                 }
