@@ -5,7 +5,6 @@
 //! to the goal.
 
 use super::closed::Raises;
-use super::coupling;
 use super::effort::Far;
 use super::lasts::{Soonest, soonest};
 use super::members::Member;
