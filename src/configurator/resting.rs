@@ -81,8 +81,8 @@ impl Engine {
     }
 
     /// The number of the transaction that applies what is still to be applied, and how many steps it has. None: there is nothing to be
-    /// done, or it would move where a safe configuration keeps everything still. It does not where somebody has asked for force, and none
-    /// has come since nobody leads.
+    /// done, or it would move where a safe configuration keeps everything still. It may move all the same where somebody has asked for
+    /// force, and none has come since nobody leads.
     fn begin_applying(&mut self, one: &mut Applied, led: Option<FrameId>) -> Option<(u64, usize)> {
         let planned = one.planned.take()?;
         let asked = self.is_hurried() && led.is_some_and(|led| !self.became_safe(led, Some(one.id)));
