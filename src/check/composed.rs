@@ -73,7 +73,12 @@ where
     // Files that lead up and down each by itself may not do so together. Of a subsystem that is asked with the whole.
     let sound = reports.iter().map(|(_, of)| of).chain([&report]).all(|of| of.verdict != CheckVerdict::Refused);
     if sound && around.parent.is_none() {
-        for (finding, way) in ways::together(&whole, catalogue) {
+        let together = ways::together(&whole, catalogue);
+        if together.is_none() {
+            report.left.push("whether all files come up, and down, together was not followed".to_owned());
+            report.explored.complete = false;
+        }
+        for (finding, way) in together.into_iter().flatten() {
             report.findings.push(finding);
             report.traces.push(way);
         }

@@ -215,15 +215,16 @@ fn shortest(product: &mut Product<'_>, from: ProductState, tried: &Tried, goal: 
     let mut failed: Option<(usize, Vec<Next>, usize)> = None;
     states.push((from.clone(), None, Vec::new()));
     queue.push_back(0);
-    let (mut last, mut reached, mut round) = (0, None, None);
+    let (mut last, mut reached, mut round, mut unfollowed) = (0, None, None, false);
     while let Some(at) = queue.pop_front() {
         let state = states[at].0.clone();
         if at > 0 && state.is_at_rest() && product.all_in(&state, goal) {
             reached = Some(at);
             break;
         }
-        let (met, most) = (states.len(), product.effort.transitions().max(limits::CHECK_TRANSITIONS));
+        let (met, most) = (states.len(), product.effort.transitions().max(product.most_driven));
         if met > most || !product.effort.goes_on(at, Far { states: met, transitions: at }) {
+            unfollowed = true;
             break;
         }
         last = at;
@@ -261,7 +262,10 @@ fn shortest(product: &mut Product<'_>, from: ProductState, tried: &Tried, goal: 
     }
     let refused = if reached.is_some() { None } else { refused.map(|(_, _, why)| why) };
     let failed = if reached.is_some() || refused.is_some() { None } else { failed.map(|(_, _, by)| by) };
-    Way { from, moves, reached: reached.is_some(), refused, failed, late: None, overtaken: None, in_this_order: false }
+    // What is refused, or has failed, on the way may not be in the way of another one.
+    product.untimed |= unfollowed;
+    let reached = reached.is_some();
+    Way { from, moves, reached, refused, failed, late: None, overtaken: None, unfollowed, in_this_order: false }
 }
 
 /// How the coordinators come to rest by what they ask for by themselves, before anybody wants them up. Where they go round

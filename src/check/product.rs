@@ -85,6 +85,8 @@ pub struct Product<'a> {
     pub(super) standing: FxHashMap<ConfigId, Duration>,
     /// There were too many ways up or down to find the one that lasts shortest.
     pub untimed: bool,
+    /// So many states are looked at for a way up or down, at least.
+    pub(super) most_driven: usize,
     /// Two times were over at the same moment on a way up or down, and led to different ends.
     pub(super) tied: bool,
     /// A way up or down comes elsewhere in another order.
@@ -153,6 +155,7 @@ impl<'a> Product<'a> {
             never_down: false,
             standing: super::stands::standing(deployment),
             untimed: false,
+            most_driven: limits::CHECK_TRANSITIONS,
             tied: false,
             unordered: false,
             unjudged: false,

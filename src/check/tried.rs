@@ -21,6 +21,8 @@ pub struct Way {
     pub late: Option<(Duration, Vec<Timer>)>,
     /// Another way would wait for the first of these, and the second always comes before it.
     pub overtaken: Option<(Timer, Timer)>,
+    /// It does not arrive as far as was looked: there are too many ways.
+    pub unfollowed: bool,
     /// It does not arrive, and would in another order of answers and of what coordinators tell each other.
     pub in_this_order: bool,
 }

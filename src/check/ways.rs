@@ -2,12 +2,14 @@
 
 use super::closed::still_comes;
 use super::drive;
+use super::effort::Effort;
 use super::judge::Traced;
 use super::product::Product;
 use super::state::{Next, ProductState};
 use super::timers::Timer;
 use super::trace::TraceStep;
 use super::tried::Way;
+use crate::limits;
 use crate::model::codes::{DEPLOY_LEFTOVERS, DEPLOY_NEVER_DOWN, DEPLOY_NEVER_UP, STACK_SQUASHED};
 use crate::model::{Catalogue, Code, Coordinator, Deployment, Finding, Origin, Severity};
 use crate::statechart::{Chart, NodeId};
@@ -24,10 +26,16 @@ pub fn ways(product: &mut Product<'_>) -> Traced {
         true if !reason.origin.is_some() => reason.at(deployment.key_origin("limits.stack")).path("limits.stack"),
         _ => reason,
     };
-    let reasons =
-        |way: &Way| way.refused.iter().flat_map(|(_, reasons)| reasons.clone()).map(placed).collect::<Vec<_>>();
+    let reasons = |way: &Way| {
+        way.refused
+            .iter()
+            .filter(|_| !way.unfollowed)
+            .flat_map(|(_, reasons)| reasons.clone())
+            .map(placed)
+            .collect::<Vec<_>>()
+    };
     let mut up = reasons(&rise);
-    if !rise.reached {
+    if !rise.reached && !rise.unfollowed {
         up.push(stops(product, &rise, DEPLOY_NEVER_UP, "deploy.up", |c| &c.up, "the bring-up"));
     }
     up.extend(late(product, &rise, DEPLOY_NEVER_UP, "deploy.within_s", "the bring-up"));
@@ -35,7 +43,8 @@ pub fn ways(product: &mut Product<'_>) -> Traced {
     if let Some(fall) = &fall {
         down.extend(late(product, fall, DEPLOY_NEVER_DOWN, "shutdown.within_s", "the shutdown"));
         if !fall.reached {
-            down.push(stops(product, fall, DEPLOY_NEVER_DOWN, "shutdown.down", |c| &c.down, "the shutdown"));
+            let stops = || stops(product, fall, DEPLOY_NEVER_DOWN, "shutdown.down", |c| &c.down, "the shutdown");
+            down.extend((!fall.unfollowed).then(stops));
         } else if let Some(finding) = leftovers(product, fall.end()) {
             down.push(finding);
         }
@@ -58,13 +67,21 @@ pub fn ways(product: &mut Product<'_>) -> Traced {
     found
 }
 
-/// The same of a deployment and all of its subsystems, which go up and down as one.
-pub fn together(whole: &Deployment, catalogue: &Catalogue) -> Traced {
+/// The same of a deployment and all of its subsystems, which go up and down as one. None: it was not followed, since there are too many
+/// coordinators, or too many ways, or since what functions raise is not known.
+pub fn together(whole: &Deployment, catalogue: &Catalogue) -> Option<Traced> {
+    if whole.coordinators.len() > limits::CHECK_TOGETHER {
+        return None;
+    }
     let charts: Option<Vec<Chart>> = whole.charts().map(|chart| crate::statechart::compile(chart).0).collect();
-    // What functions raise is not known.
-    let Some(charts) = charts.filter(|charts| charts.iter().all(Chart::is_pure)) else { return Traced::new() };
+    let charts = charts.filter(|charts| charts.iter().all(Chart::is_pure))?;
     let charts: Vec<&Chart> = charts.iter().collect();
-    ways(&mut Product::of_all(whole, &charts, catalogue))
+    let mut product = Product::of_all(whole, &charts, catalogue);
+    let effort = Effort { transitions: limits::CHECK_TOGETHER_WAYS, ..Effort::default() };
+    product.follow_with(effort);
+    product.most_driven = limits::CHECK_TOGETHER_WAYS;
+    let found = ways(&mut product);
+    (!product.untimed).then_some(found)
 }
 
 /// The ways one after the other, as a trace from the start.

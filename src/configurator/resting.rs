@@ -9,10 +9,11 @@ use super::request::{Reason, Request};
 use super::running::{Purpose, Running};
 use super::teardown::own_plan;
 use crate::limits;
-use crate::model::{Ask, ConfigId, RequestId};
+use crate::model::{Ask, ComponentName, ConfigId, RequestId};
 use crate::plan::PlannedStep;
-use crate::stack::claims::is_of_system;
+use crate::stack::claims::is_in_system;
 use crate::stack::{BestEffort, FrameId, Planned, Requester, effort};
+use crate::system::touch;
 use crate::time::Time;
 use crate::transaction::Transaction;
 use smallvec::SmallVec;
@@ -85,12 +86,12 @@ impl Engine {
     /// force, and none has come since nobody leads.
     fn begin_applying(&mut self, one: &mut Applied, led: Option<FrameId>) -> Option<(u64, usize)> {
         let planned = one.planned.take()?;
-        let asked = self.is_hurried() && led.is_some_and(|led| !self.became_safe(led, Some(one.id)));
-        if one.rests
-            && !asked
-            && self.world.stack.safe().any(|safe| is_of_system(safe, one.id))
-            && let Some(moving) = planned.steps.iter().find(|planned| planned.moves)
-        {
+        // Whoever has written it: what it moves counts, which may be of a subsystem.
+        let still = |component: ComponentName| led.is_some_and(|led| self.stands_still(component, led));
+        let moving = planned.steps.iter().find(|planned| {
+            planned.moves && touch::components(&planned.step).iter().any(|component| still(*component))
+        });
+        if let Some(moving) = moving {
             one.troubles = vec![Reason::Moves(moving.step.clone())];
             return None;
         }
@@ -101,6 +102,17 @@ impl Engine {
         let running = Running::new(number, machine, Purpose::Own, serves, self.world.stack.next());
         self.running.push(Running { enters_quarantine: !one.rests, ..running });
         Some((number, steps))
+    }
+
+    /// Whether a safe configuration keeps a component still also from what is forced: one that was in force before stopping began, or has
+    /// come since nobody leads; each, where nobody has asked for force.
+    fn stands_still(&self, component: ComponentName, led: FrameId) -> bool {
+        let asked = self.is_hurried();
+        let mut safe = self.world.stack.frames().iter().filter(|frame| frame.safe);
+        safe.any(|frame| {
+            let keeps = !asked || !self.came_since(frame) || frame.id >= led;
+            keeps && is_in_system(frame.configuration, component)
+        })
     }
 
     /// What has come of it, and what of that is tried again.

@@ -7,8 +7,7 @@ use super::running::{Purpose, Running};
 use crate::limits;
 use crate::model::{ConfigId, Origin, RequestId, Step};
 use crate::plan::{PlanStage, PlannedStep};
-use crate::stack::claims::is_of_system;
-use crate::stack::{Broken, Frame, FrameId, Part, Planned, Residual, Why};
+use crate::stack::{Broken, FrameId, Part, Planned, Residual, Why};
 use crate::system::{self, Reversibility, System, Undo};
 use crate::time::Time;
 use crate::transaction::{Input, Limit, Spec, Transaction};
@@ -68,6 +67,8 @@ impl Engine {
         self.forget_standings();
         // Not after what is out has come in: now.
         self.break_off();
+        // What is safe and was asked for before is no emergency meanwhile.
+        self.after_safe();
         let (led, since) = (self.nobody_leads(), self.world.stack.next());
         let Force { safe, rest } = self.given.force.clone();
         self.make_all_safe(&safe, &mut down);
@@ -76,7 +77,7 @@ impl Engine {
         self.end_running();
         self.refuse_waiting();
         // An emergency meanwhile: nothing is taken away from under what it holds, before somebody asks once more.
-        if self.became_safe(since, None) {
+        if self.became_safe(since) {
             self.see_left(&mut down);
             down.still = true;
             down.in_time = self.given.clock.now() <= deadline;
@@ -84,6 +85,8 @@ impl Engine {
             self.changed();
             return down;
         }
+        // Whatever time that took: to remove it is what force is for.
+        let deadline = deadline.max(self.given.clock.now() + self.given.limits.step_timeout);
         self.remove_all(&mut down, deadline);
         self.world.stack.discard();
         self.world.broken.clear();
@@ -147,10 +150,9 @@ impl Engine {
         }
     }
 
-    /// Whether a safe configuration has come since this frame would have been the next; `of`: one in whose (sub)system that is.
-    pub(super) fn became_safe(&self, since: FrameId, of: Option<ConfigId>) -> bool {
-        let about = |frame: &Frame| of.is_none_or(|of| is_of_system(frame.configuration, of));
-        self.world.stack.frames().iter().any(|frame| frame.safe && frame.id >= since && about(frame))
+    /// Whether a safe configuration has come since this frame would have been the next.
+    fn became_safe(&self, since: FrameId) -> bool {
+        self.world.stack.frames().iter().any(|frame| frame.safe && frame.id >= since)
     }
 
     /// Carries something of one's own out, while everything else goes on.

@@ -227,7 +227,7 @@ impl Session {
     fn take_all_back(&self, told: &mut Announced) -> (Came, HeldUp) {
         let deadline = self.clock().now() + self.deployment().shutdown.within;
         let Some(down) = self.stage_of(self.configurator().take_back(deadline), deadline) else {
-            told.notes.push(Unanswered.to_string());
+            self.note_all(vec![Unanswered.to_string()], told);
             return (Came::Left(Unanswered.to_string()), self.is_held());
         };
         let popped = down.popped.iter().map(|id| format!("`{id}` undone"));
@@ -263,14 +263,15 @@ impl Session {
     /// The third stage.
     fn force_all(&self, told: &mut Announced) -> (Came, HeldUp) {
         // What brings it to rest takes nothing of the time in which everything is removed.
-        let rest = |id: ConfigId| self.deployment().configuration(id).and_then(|c| c.timeout);
         let step = self.deployment().limits.step_timeout;
-        let rest: Duration =
-            self.deployment().all_rest().into_iter().map(|id| rest(id).unwrap_or(step).max(step)).sum();
-        let within = self.deployment().shutdown.within + rest;
+        let takes = |of: Option<Duration>| of.unwrap_or(step).max(step);
+        let safe = self.deployment().configurations.iter().filter(|c| c.safe).map(|c| takes(c.timeout));
+        let rest = self.deployment().all_rest().into_iter();
+        let rest = rest.map(|id| takes(self.deployment().configuration(id).and_then(|c| c.timeout)));
+        let within = self.deployment().shutdown.within + safe.chain(rest).sum::<Duration>();
         let deadline = self.clock().now() + within;
         let Some(down) = self.stage_of(self.configurator().force_down(deadline), deadline) else {
-            told.notes.push(Unanswered.to_string());
+            self.note_all(vec![Unanswered.to_string()], told);
             return (Came::Left(Unanswered.to_string()), HeldUp::No);
         };
         let applied = down.safe.iter().map(|id| (format!("safe configuration `{id}`"), id));

@@ -378,33 +378,29 @@ fn however_often_it_panics_a_call_under_way_is_left_to_its_undo() {
     }
 }
 
-#[test]
-fn a_panic_does_not_end_force() {
+/// What comes of a stage of stopping of which the configurator panics in the middle.
+fn panics_in(stage: impl FnOnce(&Rig, Time) -> davit::time::Receiver<davit::configurator::TakenDown>) {
     let rig = up_with(vec![]);
     rig.platform
         .set_delays(Delays { of: vec![(StepPattern::new("stop"), Duration::from_millis(200))], ..Delays::default() });
     let deadline = rig.clock.now() + Duration::from_secs(30);
-    let answer = rig.handle.force_down(deadline);
-    rig.wait(0.3);
-    assert!(rig.handle.inject_panic());
-    let told = answer.recv_deadline(deadline).expect("it is told how it ended");
-    assert!(told.is_clean(), "{told:?}");
-    assert!(rig.see().is_empty());
-}
-
-#[test]
-fn a_panic_does_not_end_the_second_stage_of_stopping() {
-    let rig = up_with(vec![]);
-    rig.platform
-        .set_delays(Delays { of: vec![(StepPattern::new("stop"), Duration::from_millis(200))], ..Delays::default() });
-    let deadline = rig.clock.now() + Duration::from_secs(30);
-    let answer = rig.handle.take_back(deadline);
+    let answer = stage(&rig, deadline);
     rig.wait(0.3);
     assert!(rig.handle.inject_panic());
     let told = answer.recv_deadline(deadline).expect("it is told how it ended");
     assert!(told.is_clean() && told.kept.is_empty() && told.troubles.is_empty(), "{told:?}");
     assert!(rig.clock.now() < deadline, "it is told when it is over");
     assert!(rig.see().is_empty());
+}
+
+#[test]
+fn a_panic_does_not_end_force() {
+    panics_in(|rig, deadline| rig.handle.force_down(deadline));
+}
+
+#[test]
+fn a_panic_does_not_end_the_second_stage_of_stopping() {
+    panics_in(|rig, deadline| rig.handle.take_back(deadline));
 }
 
 /// Who recovers something is told at once what became of it, and may go on.
