@@ -33,6 +33,7 @@ mod motion;
 mod part;
 mod recovery;
 mod resting;
+mod rests;
 mod scripts;
 mod setting;
 mod several;
