@@ -68,9 +68,9 @@ pub fn ways(product: &mut Product<'_>) -> Traced {
 }
 
 /// The same of a deployment and all of its subsystems, which go up and down as one. None: it was not followed, since there are too many
-/// coordinators, or too many ways, or since what functions raise is not known.
+/// configurations, or too many ways, or since what functions raise is not known.
 pub fn together(whole: &Deployment, catalogue: &Catalogue) -> Option<Traced> {
-    if whole.coordinators.len() > limits::CHECK_TOGETHER {
+    if whole.configurations.len() > limits::CHECK_TOGETHER {
         return None;
     }
     let charts: Option<Vec<Chart>> = whole.charts().map(|chart| crate::statechart::compile(chart).0).collect();

@@ -75,9 +75,9 @@ pub const CHECK_CYCLE: usize = 128;
 /// round for ever.
 pub const CHECK_DRIVEN: usize = 10_000;
 
-/// Coordinators of a deployment and its subsystems that are driven up and down as one: each plans what it asks for in the whole system,
-/// some 0.2 s where that is a robot's.
-pub const CHECK_TOGETHER: usize = 8;
+/// Configurations of a deployment and its subsystems that are driven up and down as one: what is asked for is planned in the whole system,
+/// some 0.2 s for a robot's fifty.
+pub const CHECK_TOGETHER: usize = 200;
 
 /// States that are looked at for that: it mostly goes straight there.
 pub const CHECK_TOGETHER_WAYS: usize = 4_000;
