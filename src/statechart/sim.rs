@@ -167,8 +167,12 @@ impl<'c, F: Hook> Sim<'c, F> {
                 .flat_map(|node| chart.outgoing(node))
                 .any(|edge| chart.triggers(edge).is_some_and(|triggers| triggers.contains(&event)))
         };
-        let lost = names.iter().filter(|name| name.as_str() != "e_init_fsm" && !looked_at(chart.event(**name)));
-        let mut lost: Vec<&str> = lost.map(EventName::as_str).collect();
+        let mut lost: Vec<&str> = Vec::new();
+        for name in names.iter().filter(|name| name.as_str() != "e_init_fsm" && !looked_at(chart.event(**name))) {
+            if lost.len() <= UNKNOWN_SHOWN && !lost.contains(&name.as_str()) {
+                lost.push(name.as_str());
+            }
+        }
         if lost.is_empty() {
             return;
         }

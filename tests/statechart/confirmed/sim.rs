@@ -36,8 +36,9 @@ fn a_set_too_large_is_cut_and_said() {
     let chart = compiled(vec![s("a", vec![]), t("initial", "a", "")]);
     let mut sim = Sim::new(&chart);
     let seen = line(&mut sim, &"e ".repeat(davit::limits::CHART_QUEUE + 4));
-    assert_eq!(seen.notes.len(), 1, "one place was taken by the event of the first entry");
-    assert!(seen.notes[0].starts_with("5 events found no room"));
+    let [entered, cut] = &seen.notes[..] else { panic!("{:?}", seen.notes) };
+    assert!(entered.starts_with("`e` is lost: this step enters the machine"), "{entered}");
+    assert!(cut.starts_with("5 events found no room"), "one place was taken by the event of the first entry: {cut}");
 }
 
 #[test]
