@@ -212,7 +212,7 @@ fn tell(failure: ScriptFailure) -> CommandFailure {
         ScriptFailure::Unread { message } => CommandFailure::usage(
             SCRIPT_UNKNOWN_PARAMETER,
             message,
-            "a script reads one with `param(\"NAME\", DEFAULT)`, before it deploys anything",
+            "a script reads one with `param(\"NAME\", DEFAULT)`",
         ),
         ScriptFailure::Missed { message } => CommandFailure::no(
             SCRIPT_MISSED,
