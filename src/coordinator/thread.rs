@@ -113,12 +113,15 @@ impl CoordinatorHandle {
     /// # Errors
     /// [`NotAccepted`]: there is no room (counted), or the coordinator has been detached.
     pub fn deliver(&self, incoming: Incoming) -> Result<Put, NotAccepted> {
-        if self.is_detached() {
-            return Err(NotAccepted::Detached);
+        {
+            let mut inbox = lock(&self.shared.inbox);
+            if self.is_detached() {
+                inbox.not_heard(incoming);
+                return Err(NotAccepted::Detached);
+            }
+            inbox.push(incoming)
         }
-        let put = lock(&self.shared.inbox).push(incoming)?;
-        self.shared.bell.notify();
-        Ok(put)
+        .inspect(|_| self.shared.bell.notify())
     }
 
     /// The active leaf; none before the chart was entered. Takes no lock (but for a model that has added to its chart).
@@ -172,14 +175,20 @@ impl CoordinatorHandle {
 
     /// Takes the command from it: when this returns, its listener hears nothing from it any more. Waits for a call of the
     /// listener at most, never for a function of the model. Its last state stays readable; its thread ends by itself, once
-    /// nothing in it hangs.
-    pub fn detach(&self) {
-        self.shared.detached.store(true, Ordering::SeqCst);
+    /// nothing in it hangs. Answers the urgent events to which it has not reacted, also where it hangs in one of them or has ended
+    /// by itself; each is answered once.
+    pub fn detach(&self) -> Vec<EventName> {
+        // Under its lock: what comes later is refused, and nothing is put where nobody looks.
+        {
+            let _inbox = lock(&self.shared.inbox);
+            self.shared.detached.store(true, Ordering::SeqCst);
+        }
         self.shared.bell.notify();
         let own = lock(&self.shared.thread).id == Some(std::thread::current().id());
         if !own {
             drop(lock(&self.shared.telling));
         }
+        lock(&self.shared.inbox).take_urgent()
     }
 
     /// Detaches it and waits for its thread to end.
@@ -257,6 +266,7 @@ impl CoordinatorShared {
                 Some(incoming) => {
                     let delivered = core.deliver(incoming.event, incoming.tag, now, &mut listener);
                     tickets.iter().for_each(|ticket| listener.taken_up(*ticket, delivered));
+                    lock(&self.inbox).reacted();
                     true
                 }
                 None if core.next_deadline().is_some_and(|due| due <= now) => {

@@ -39,8 +39,6 @@ pub struct Hub {
     /// Names from outside that only functions may hear.
     pub(super) unlisted: Unlisted,
     halt: StoppingState,
-    /// Safety events of its subsystems, by their whole names.
-    safety_inside: FxHashSet<EventName>,
 }
 
 struct HubState {
@@ -121,7 +119,6 @@ impl Hub {
             emits: emits.into_iter().collect(),
             unlisted: Unlisted::default(),
             halt: StoppingState::default(),
-            safety_inside: FxHashSet::default(),
         }
     }
 
@@ -131,15 +128,9 @@ impl Hub {
         Self { halt: StoppingState::new(events, safe), ..self }
     }
 
-    /// With those of its subsystems, which act on them by themselves.
-    #[must_use]
-    pub fn with_safety_inside(self, events: impl IntoIterator<Item = EventName>) -> Self {
-        Self { safety_inside: events.into_iter().collect(), ..self }
-    }
-
     /// Whether an event is one of safety, of the deployment or of a subsystem.
     pub fn is_safety(&self, event: EventName) -> bool {
-        self.halt.is_safety(event) || self.safety_inside.contains(&event)
+        self.halt.is_safety(event)
     }
 
     /// How far stopping is.

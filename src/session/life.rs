@@ -152,7 +152,7 @@ impl Session {
     }
 
     pub(super) fn finish(&self, stage: Stage, forced: Vec<String>) -> Ended {
-        self.detach_coordinator();
+        self.detach_coordinators();
         let left = self.left_over();
         // With something left the configurator stays, as long as the session: when a call returns late, it cleans up.
         if left.is_empty() {

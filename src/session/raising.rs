@@ -144,6 +144,9 @@ impl Session {
             }
         }
         (0..missed).for_each(|_| self.hub().taken_up(ticket, false));
+        // Stopped meanwhile: then it acts by itself.
+        let again = || make_safe(self.hub(), self.configurator(), event, Class::Outside);
+        let acted = acted.or_else(|| gone.then(again).flatten());
         if gone && acted.is_none() {
             self.hub()
                 .note(Happening::Forced { note: format!("`{event}` was not delivered: the coordinator is gone") });

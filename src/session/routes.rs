@@ -447,11 +447,16 @@ pub(super) fn on_platform(hub: &Hub, junction: &Junction, event: &PlatformEvent)
     }
     hub.report(Happening::Event { event: event.to_string(), from, safety: hub.is_safety(event) });
     hub.halt().report(event);
+    let acts = || configurator.as_ref().and_then(|configurator| make_safe(hub, configurator, event, Class::Report));
     if let Some(configurator) = &configurator {
         junction.tell_leaving(configurator, event);
-        make_safe(hub, configurator, event, Class::Report);
     }
+    let acted = acts();
     junction.give_all(hub, Class::Report, event);
+    if acted.is_none() {
+        // Nobody leads any more since just now.
+        acts();
+    }
 }
 
 /// What a safety event did that acted by itself.

@@ -3,9 +3,11 @@
 use super::halt::StandsStill;
 use super::life::{Ended, UNSEEN, survived};
 use super::log::{Happening, Phase};
+use super::routes::make_safe;
 use super::stages::{Came, NextStage, Stage, first, next};
 use super::{Command, Session, Unanswered};
 use crate::configurator::{FrameView, TakenDown};
+use crate::coordinator::Class;
 use crate::limits;
 use crate::model::{ConfigId, EventName, Step};
 use crate::statechart::{EventId, NodeId};
@@ -75,11 +77,11 @@ impl Session {
             // What panics in one of them is a defect of ours, and leaves it to the next.
             let began = survived(|| self.begin_stage(stage, why.take(), &mut told));
             let (came, held) = began
-                .and_then(|()| {
-                    survived(|| match stage {
-                        Stage::Led => (self.lead_down(&told), HeldUp::No),
-                        Stage::TakenBack => self.take_all_back(&mut told),
-                        Stage::Forced => self.force_all(&mut told),
+                .and_then(|safety| {
+                    survived(|| match (stage, safety) {
+                        // It came before force did: what it makes safe is let go by people alone.
+                        (Stage::Forced, Some(event)) => (Came::Left(format!("`{event}` came before")), HeldUp::Yes),
+                        (stage, _) => self.carry_out(stage, &mut told),
                     })
                 })
                 .unwrap_or_else(|panic| {
@@ -121,21 +123,39 @@ impl Session {
         ended
     }
 
-    fn begin_stage(&self, stage: Stage, why: Option<String>, told: &mut Announced) {
+    fn carry_out(&self, stage: Stage, told: &mut Announced) -> (Came, HeldUp) {
+        match stage {
+            Stage::Led => (self.lead_down(told), HeldUp::No),
+            Stage::TakenBack => self.take_all_back(told),
+            Stage::Forced => self.force_all(told),
+        }
+    }
+
+    /// A stage begins. A safety event that came before, to which no coordinator has reacted, acts by itself; it is answered if
+    /// something safe is applied for it.
+    fn begin_stage(&self, stage: Stage, why: Option<String>, told: &mut Announced) -> Option<EventName> {
         let hub = self.hub();
         if let Some(why) = &why {
             told.notes.push(format!("stopped {}: {why}", stage.words()));
         }
         told.stage = stage;
-        if stage != Stage::Led {
-            // Never two commanders.
-            self.detach_coordinator();
-        }
         hub.halt().stage(stage);
+        // Never two commanders.
+        let unheard = if stage == Stage::Led { Vec::new() } else { self.detach_coordinators() };
         // Who only hears of it must not keep it from being done.
         if let Err(panic) = survived(|| hub.note(Happening::Stopping { stage, why })) {
             told.notes.push(format!("who hears of it has panicked: {panic}"));
         }
+        let acts = |event: &EventName| {
+            let acted = make_safe(hub, self.configurator(), *event, Class::Report);
+            acted.is_some_and(|acted| !acted.requests.is_empty())
+        };
+        let acted: Vec<EventName> = unheard.into_iter().filter(acts).collect();
+        for event in &acted {
+            let note = format!("`{event}` came before, and no coordinator had reacted to it: it acts by itself");
+            self.note_all(vec![note], told);
+        }
+        acted.first().copied()
     }
 
     /// Whether every coordinator is there.

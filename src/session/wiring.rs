@@ -76,13 +76,7 @@ impl Session {
         let emits = deployment.emits.iter().map(|(event, _)| *event).chain(between(&charts));
         let hub = Hub::new(&clock, deployment.configurations.iter().map(|c| c.id), emits);
         let safe = deployment.configurations.iter().filter(|c| c.safe).map(|c| c.id).collect();
-        let hub = hub.with_safety(deployment.safety.iter().map(|(event, _)| *event), safe);
-        let hub =
-            Arc::new(hub.with_safety_inside(
-                deployment.all_subsystems().iter().flat_map(|(path, subsystem)| {
-                    subsystem.own.safety.iter().map(move |(event, _)| event.within(*path))
-                }),
-            ));
+        let hub = Arc::new(hub.with_safety(deployment.safety.iter().map(|(event, _)| *event), safe));
         let subsystems = Arc::new(Subsystems::new(&deployment, &clock));
         let junction = Arc::new(Junction::new(&deployment, subsystems.clone()));
         let steps = Arc::new(Steps::default());
@@ -439,8 +433,15 @@ impl Session {
         self.hub.failures_since(heard)
     }
 
-    pub(super) fn detach_coordinator(&self) {
-        self.parts.iter().for_each(|part| part.coordinator.detach());
+    /// None of them leads any more. The safety events that came before and to which nobody has reacted, each once.
+    pub(super) fn detach_coordinators(&self) -> Vec<EventName> {
+        let mut unheard = Vec::new();
+        for event in self.parts.iter().flat_map(|part| part.coordinator.detach()) {
+            if self.hub.is_safety(event) && !unheard.contains(&event) {
+                unheard.push(event);
+            }
+        }
+        unheard
     }
 
     /// What is left, as the platform sees it. Where it does not answer: as the configurator knows it, and that more may be.
@@ -483,7 +484,7 @@ impl Session {
 /// A session that is dropped without having been taken down leaves its components to the platform, but no thread behind.
 impl Drop for Session {
     fn drop(&mut self) {
-        self.detach_coordinator();
+        self.detach_coordinators();
         self.part();
     }
 }

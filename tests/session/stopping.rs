@@ -423,6 +423,23 @@ fn an_emergency_while_it_is_forced_waits_for_people() {
     small.is_empty();
 }
 
+/// One that waits for its coordinator when force begins is not lost with that: it acts by itself, and people let go.
+#[test]
+fn an_emergency_that_nobody_has_reacted_to_when_force_begins_waits_for_people() {
+    let small = Small::up("lowering");
+    small.session.raise(event("e_estop"), "test");
+    small.after(30.0, force);
+    let began = small.clock.now();
+    let ended = small.session.take_down(true);
+    let took = small.clock.now().since(began).as_secs_f64();
+    assert!((30.0..33.0).contains(&took), "{took}: {ended:?}");
+    assert!(small.heard("calm.ok"), "{:?}", small.heard.lock().unwrap());
+    let note = "`e_estop` came before, and no coordinator had reacted to it: it acts by itself";
+    assert!(ended.forced.iter().any(|told| told == note), "{ended:?}");
+    assert!(ended.is_clean() && ended.stage == Stage::Forced, "{ended:?}");
+    small.is_empty();
+}
+
 /// When no coordinator hears it any more, a safety event acts by itself: the call under way is given up, and nothing moves.
 #[test]
 fn a_safety_event_acts_by_itself_once_nobody_leads() {

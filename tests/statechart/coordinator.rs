@@ -216,6 +216,29 @@ fn detached_it_raises_nothing_more() {
     coordinator.stop(Time::NEVER).unwrap();
 }
 
+/// What goes before all others is not lost with it: whoever leads from then on is told, whether it waited, was being reacted to, or came
+/// just after.
+#[test]
+fn what_is_urgent_and_was_not_reacted_to_is_answered() {
+    let clock = Clock::simulated();
+    let _guard = clock.enter();
+    let chart =
+        Arc::new(compiled(vec![s("a", vec![]), t("initial", "a", ""), t("a", "a", "e"), t("a", "a", "e_stop")]));
+    let coordinator = CoordinatorHandle::start("coordinator", chart, &clock, Log::default());
+    clock.sleep(Duration::from_millis(1));
+    coordinator.deliver(Incoming::new(Class::Urgent, event("e_stop"))).unwrap();
+    clock.sleep(Duration::from_millis(1));
+    for (class, name) in [(Class::Report, "e"), (Class::Urgent, "e_stop"), (Class::Urgent, "e_halt")] {
+        coordinator.deliver(Incoming::new(class, event(name))).unwrap();
+    }
+    assert_eq!(coordinator.detach(), ["e_stop", "e_halt"].map(event), "not what was reacted to before");
+    assert_eq!(coordinator.detach(), [], "each once");
+    assert!(coordinator.deliver(Incoming::new(Class::Urgent, event("e_halt"))).is_err());
+    clock.sleep(Duration::from_secs(1));
+    assert_eq!(coordinator.detach(), [event("e_halt")], "which came later, and its thread has ended since");
+    coordinator.stop(Time::NEVER).unwrap();
+}
+
 #[test]
 fn a_flood_of_reports_does_not_displace_what_is_urgent() {
     let clock = Clock::simulated();
@@ -320,7 +343,7 @@ fn it_is_detached_though_a_function_of_its_model_hangs() {
     let (log, own) = (Log::default(), clock.clone());
     let coordinator =
         CoordinatorHandle::start_with("coordinator", Arc::new(copying()), &clock, log.clone(), move || Ok(Slow(own)));
-    coordinator.deliver(Incoming::new(Class::Outside, event("e_aligned"))).unwrap();
+    coordinator.deliver(Incoming::new(Class::Urgent, event("e_aligned"))).unwrap();
     clock.sleep(Duration::from_millis(1));
     let asked = clock.now();
     assert!(!coordinator.is_settled() && !coordinator.hangs());
@@ -328,7 +351,7 @@ fn it_is_detached_though_a_function_of_its_model_hangs() {
     clock.sleep(Duration::from_secs(1));
     assert!(coordinator.hangs(), "for longer than a second");
     let asked = clock.now();
-    coordinator.detach();
+    assert_eq!(coordinator.detach(), [event("e_aligned")], "what it hangs in is not lost");
     assert_eq!(clock.now(), asked, "nobody waits for it");
     assert!(coordinator.stop(clock.now() + Duration::from_secs(1)).is_err(), "its thread is still in the function");
     clock.sleep(Duration::from_secs(20));

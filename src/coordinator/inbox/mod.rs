@@ -178,6 +178,10 @@ pub(super) struct Inbox {
     row: usize,
     urgent_row: usize,
     low_row: (List, usize),
+    /// The urgent event that is reacted to.
+    in_hand: Option<EventName>,
+    /// Urgent ones that the coordinator had not reacted to when it ended.
+    unheard: Vec<EventName>,
     dropped: Dropped,
 }
 
@@ -201,6 +205,8 @@ impl Inbox {
             row: 0,
             urgent_row: 0,
             low_row: (List::Reports, 0),
+            in_hand: None,
+            unheard: Vec::new(),
             dropped: Dropped::default(),
         }
     }
@@ -322,6 +328,7 @@ impl Inbox {
         let (at, incoming) = self.lists.pop(list)?;
         match incoming.class {
             Class::Urgent => {
+                self.in_hand = Some(incoming.event);
                 self.singles.remove(&(List::Urgent, incoming.event, None));
                 tickets.extend(self.joined.iter().filter(|(event, _)| *event == incoming.event).map(|(_, t)| *t));
                 self.joined.retain(|(event, _)| *event != incoming.event);
@@ -391,8 +398,33 @@ impl Inbox {
         self.dropped
     }
 
-    /// Forgets all that waits.
+    /// What was taken out last has been reacted to.
+    pub fn reacted(&mut self) {
+        self.in_hand = None;
+    }
+
+    /// An urgent event came when nobody takes anything out any more.
+    pub fn not_heard(&mut self, incoming: Incoming) {
+        if incoming.class == Class::Urgent && !self.unheard.contains(&incoming.event) {
+            self.unheard.push(incoming.event);
+        }
+    }
+
+    /// Takes the urgent events out that the coordinator has not reacted to, in their order; each is answered once.
+    pub fn take_urgent(&mut self) -> Vec<EventName> {
+        let mut urgent = std::mem::take(&mut self.unheard);
+        urgent.extend(self.in_hand.take());
+        while let Some((_, incoming)) = self.lists.pop(List::Urgent) {
+            self.singles.remove(&(List::Urgent, incoming.event, None));
+            urgent.push(incoming.event);
+        }
+        self.joined.clear();
+        urgent
+    }
+
+    /// Forgets all that waits, but for which urgent events there were.
     pub fn clear(&mut self) {
+        self.unheard = self.take_urgent();
         self.lists.clear();
         self.singles.clear();
         self.joined.clear();
