@@ -22,15 +22,33 @@ pub enum Raises {
     Somebody,
 }
 
+/// What is known of an event from outside wherever it comes: it is asked for again and again.
+#[derive(Debug, Clone, Copy)]
+pub struct FromOutside {
+    /// Coordinators tell it each other.
+    pub told_between: bool,
+    /// Who may raise it, or one that is followed as it, while the deployment is being stopped.
+    raises: Raises,
+}
+
 impl Product<'_> {
+    /// What is known of each event from outside.
+    pub(super) fn known_outside(&self) -> Vec<FromOutside> {
+        let all = self.outside.iter().zip(0u16..);
+        all.map(|(name, at)| FromOutside {
+            told_between: self.deployment.is_told_between(name.as_str()),
+            raises: self.alike_to(at).map(|name| self.may_raise(name)).max().unwrap_or(Raises::Nobody),
+        })
+        .collect()
+    }
+
     /// Who may raise, while it is being stopped, what a move brings from outside.
     pub(super) fn raises_while_stopping(&self, by: Move) -> Raises {
-        let of = |name: EventName| self.may_raise(name);
         match by {
-            Move::Event(at) => self.alike_to(at).map(of).max().unwrap_or(Raises::Nobody),
+            Move::Event(at) => self.from_outside[usize::from(at)].raises,
             Move::Confirmed(id) => {
                 let confirm = self.worlds.configuration(id).and_then(|configuration| configuration.confirm);
-                confirm.map_or(Raises::Somebody, |confirm| of(confirm.event))
+                confirm.map_or(Raises::Somebody, |confirm| self.may_raise(confirm.event))
             }
             Move::Lost(_) | Move::Elsewhere(_) => Raises::Sometimes,
             _ => Raises::Somebody,

@@ -5,11 +5,11 @@
 //! to the goal.
 
 use super::closed::Raises;
-use super::effort::Far;
 use super::lasts::{Soonest, soonest};
 use super::members::Member;
 use super::outcome::Held;
 use super::product::Product;
+use super::shortest::shortest;
 use super::shows::goes;
 use super::state::{Failed, Move, Next, ProductState};
 use super::timers::{Waits, takes};
@@ -20,7 +20,6 @@ use crate::plan::PlannedStep;
 use crate::stack::Request;
 use crate::statechart::{Chart, NodeId};
 use rustc_hash::{FxHashMap, FxHashSet};
-use std::collections::VecDeque;
 
 /// One thing that happens on the way.
 #[derive(Debug, Clone)]
@@ -150,7 +149,7 @@ impl Product<'_> {
                 let name = self.outside[usize::from(at)];
                 // What they tell each other comes of them where all goes well.
                 let wanted = name == tried.first;
-                let comes = if first { wanted } else { !self.deployment.is_told_between(name.as_str()) };
+                let comes = if first { wanted } else { !self.from_outside[usize::from(at)].told_between };
                 // Of subsystems what they tell where nothing fails in them. It is wanted up once.
                 let well = next.failed == Failed::Nothing || !self.is_told_by_child(name);
                 comes && well && name != tried.never && (first || tried.stopping || !wanted)
@@ -205,67 +204,6 @@ fn timely(product: &mut Product<'_>, from: ProductState, tried: &Tried, goal: Go
         Soonest::TooMany => product.untimed = true,
     }
     way
-}
-
-fn shortest(product: &mut Product<'_>, from: ProductState, tried: &Tried, goal: Goal) -> Way {
-    let mut states: Vec<(ProductState, Option<usize>, Vec<Next>)> = Vec::new();
-    let mut index: FxHashSet<ProductState> = FxHashSet::default();
-    let mut queue: VecDeque<usize> = VecDeque::new();
-    let mut refused: Option<(usize, Vec<Next>, (Request, Findings))> = None;
-    let mut failed: Option<(usize, Vec<Next>, usize)> = None;
-    states.push((from.clone(), None, Vec::new()));
-    queue.push_back(0);
-    let (mut last, mut reached, mut round, mut unfollowed) = (0, None, None, false);
-    while let Some(at) = queue.pop_front() {
-        let state = states[at].0.clone();
-        if at > 0 && state.is_at_rest() && product.all_in(&state, goal) {
-            reached = Some(at);
-            break;
-        }
-        let (met, most) = (states.len(), product.effort.transitions().max(product.most_driven));
-        if met > most || !product.effort.goes_on(at, Far { states: met, transitions: at }) {
-            unfollowed = true;
-            break;
-        }
-        last = at;
-        for next in product.outside_moves(&state, tried, at == 0) {
-            let mut moves = vec![next.clone()];
-            let rest = product.rest(next.state, goal, &mut moves, None);
-            if let Some((by, last)) = tried.fails(product, &moves) {
-                moves.truncate(last + 1);
-                let _ = failed.get_or_insert((at, moves, by));
-                continue;
-            }
-            match rest {
-                Ok(rest) => {
-                    if index.insert(rest.clone()) {
-                        // Where answers go round for ever is what keeps it from coming anywhere.
-                        round = round.or((!rest.is_at_rest()).then_some(states.len()));
-                        queue.push_back(states.len());
-                        states.push((rest, Some(at), moves));
-                    }
-                }
-                Err(why) => _ = refused.get_or_insert((at, moves, why)),
-            }
-        }
-    }
-    let (mut at, mut moves) = match (reached, &refused, &failed) {
-        (Some(at), _, _) => (at, Vec::new()),
-        (None, Some((at, moves, _)), _) | (None, None, Some((at, moves, _))) => (*at, moves.clone()),
-        (None, None, None) => (round.unwrap_or(last), Vec::new()),
-    };
-    while let Some(before) = states[at].1 {
-        let mut way = states[at].2.clone();
-        way.append(&mut moves);
-        moves = way;
-        at = before;
-    }
-    let refused = if reached.is_some() { None } else { refused.map(|(_, _, why)| why) };
-    let failed = if reached.is_some() || refused.is_some() { None } else { failed.map(|(_, _, by)| by) };
-    // What is refused, or has failed, on the way may not be in the way of another one.
-    product.untimed |= unfollowed;
-    let reached = reached.is_some();
-    Way { from, moves, reached, refused, failed, late: None, overtaken: None, unfollowed, in_this_order: false }
 }
 
 /// How the coordinators come to rest by what they ask for by themselves, before anybody wants them up. Where they go round

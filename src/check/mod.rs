@@ -82,6 +82,7 @@ mod seldom;
 mod settings;
 mod shape;
 mod shared_list;
+mod shortest;
 mod shown;
 mod shows;
 mod side_by_side;

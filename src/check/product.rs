@@ -12,6 +12,7 @@
 
 use super::aside::Aside;
 use super::children::{Child, WatchedSubsystem};
+use super::closed::FromOutside;
 use super::coordinator::outside_events;
 use super::coupling;
 use super::desks::{Desks, PlainBatch};
@@ -46,6 +47,8 @@ pub struct Product<'a> {
     pub desks: Desks,
     /// Events that come from outside.
     pub outside: Vec<EventName>,
+    /// What is known of each of them.
+    pub(super) from_outside: Vec<FromOutside>,
     /// Of each the first that no coordinator tells from it.
     pub(super) alike: Vec<usize>,
     /// What an operator may apply at any time.
@@ -103,6 +106,8 @@ pub struct Product<'a> {
     pub(super) watched: Vec<WatchedSubsystem>,
     /// What they have to do with the parent of their deployment, if it is looked at.
     pub(super) parent: Option<ParentInterface>,
+    /// Its coordinators in groups that have nothing to do with each other, by their places; none where that was not asked.
+    pub(super) groups: Vec<Vec<usize>>,
     /// How much more is followed.
     pub(super) effort: Left<'a>,
     /// What is known of reactions to steps.
@@ -138,6 +143,7 @@ impl<'a> Product<'a> {
             worlds: Worlds::new(deployment, catalogue, undone),
             desks: Desks::default(),
             outside: outside.into_iter().collect(),
+            from_outside: Vec::new(),
             alike: Vec::new(),
             operator,
             others: numbers.len() < deployment.coordinators.len(),
@@ -165,6 +171,7 @@ impl<'a> Product<'a> {
             children: if deployment.own.is_none() { Child::all(deployment) } else { Vec::new() },
             watched: Vec::new(),
             parent: None,
+            groups: Vec::new(),
             effort: Effort::default().into(),
             reacts: FxHashMap::default(),
             offers: AllOffers::default(),
@@ -175,6 +182,7 @@ impl<'a> Product<'a> {
         let names: Vec<_> = product.members.iter().map(|member| (member.name, member.of)).collect();
         product.watched = WatchedSubsystem::all(deployment, &names);
         product.alike = product.alike_events();
+        product.from_outside = product.known_outside();
         for (place, number) in numbers.iter().enumerate() {
             let own = outside_of(deployment, &views[*number], charts[*number]);
             product.members[place].listen(deployment, &own);
@@ -187,7 +195,8 @@ impl<'a> Product<'a> {
         let numbers: Vec<usize> = (0..charts.len()).collect();
         let views: Vec<Deployment> =
             numbers.iter().filter_map(|number| coupling::view(deployment, charts, *number)).collect();
-        Self::new(deployment, &views, charts, &numbers, catalogue)
+        let groups = coupling::groups(deployment, catalogue, charts);
+        Self { groups, ..Self::new(deployment, &views, charts, &numbers, catalogue) }
     }
 
     /// So much of it is followed.

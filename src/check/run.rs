@@ -156,6 +156,8 @@ fn follow(
     if all.len() == 1 {
         product.stands_in(around);
     }
+    let groups = if effort.together { vec![all.clone()] } else { coupling::groups(deployment, catalogue, charts) };
+    product.groups.clone_from(&groups);
     let mut found = ways::ways(&mut product);
     product.stands_in(around);
     if product.effort.halted().is_some() {
@@ -170,7 +172,6 @@ fn follow(
         left.insert(bound.told(Failed::Nothing, 0, effort.transitions));
         explored.complete = false;
     }
-    let groups = if effort.together { vec![all.clone()] } else { coupling::groups(deployment, catalogue, charts) };
     if groups.len() > 1 && !coupling::by_operator(deployment).is_empty() {
         left.insert(Bound::Begun.told(Failed::Nothing, 0, effort.transitions));
         explored.complete = false;
