@@ -67,7 +67,7 @@ fn last_words(name: &str) {
     // An operator insists on moving what is stopped.
     live.rows();
     insists(&live, "park");
-    live.run(1.0);
+    live.run(0.6);
     assert!(live.rows().last().unwrap().speed.norm() > 0.05, "it does not park");
     let t = live.now();
     live.raise("e_OVERCURRENT");

@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Each with what is set for it here: what takes a minute in the file is shorter.
-const SCENARIOS: [(&str, &[(&str, &str)]); 25] = [
+const SCENARIOS: [(&str, &[(&str, &str)]); 26] = [
     ("blocked", &[]),
     ("bring_up", &[]),
     ("configurator", &[]),
@@ -23,6 +23,7 @@ const SCENARIOS: [(&str, &[(&str, &str)]); 25] = [
     ("modes", &[]),
     ("one_stops", &[]),
     ("one_way", &[]),
+    ("parked_in_contact", &[]),
     ("peer_restart", &[]),
     ("pressed", &[]),
     ("push", &[]),
@@ -152,6 +153,11 @@ fn one_stops() {
 #[test]
 fn peer_restart() {
     run("peer_restart");
+}
+
+#[test]
+fn parked_in_contact() {
+    run("parked_in_contact");
 }
 
 #[test]

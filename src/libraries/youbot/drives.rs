@@ -153,6 +153,8 @@ pub struct Drives {
     settles: f64,
     outside: bool,
     base_watched: bool,
+    /// A joint gave all that position control may in the last update.
+    presses: bool,
 }
 
 impl Drives {
@@ -177,6 +179,7 @@ impl Drives {
             settles: 0.0,
             outside: false,
             base_watched: false,
+            presses: false,
         }
     }
 
@@ -288,7 +291,7 @@ impl Drives {
     /// # Errors
     /// In words, in torque control, uncalibrated, or while something else is under way.
     pub fn unfold(&mut self) -> Result<(), &'static str> {
-        self.go(radians(WORKING_POSE_DEG))
+        self.go(radians(WORKING_POSE_DEG), false)
     }
 
     /// Moves onto the stops, and holds there.
@@ -296,7 +299,7 @@ impl Drives {
     /// # Errors
     /// As [`Drives::unfold`].
     pub fn fold(&mut self) -> Result<(), &'static str> {
-        self.go(radians(PARK_POSE_DEG))
+        self.go(radians(PARK_POSE_DEG), true)
     }
 
     /// One update of `dt` seconds: what is done until the next one. Commands come with their age in s.
@@ -350,11 +353,15 @@ impl Drives {
         DriveOutput { torque: self.torque, braked, twist: command }
     }
 
-    fn position_control(&self) -> J5 {
+    fn position_control(&mut self) -> J5 {
         let mut out = self.model.gravity(&self.model.posture(&self.measured.q));
+        let most = self.may_press();
+        self.presses = false;
         for i in 0..JOINTS {
-            out[i] += POSITION_GAIN[i] * (self.target[i] - self.measured.q[i])
+            let error = POSITION_GAIN[i] * (self.target[i] - self.measured.q[i])
                 + SPEED_GAIN[i] * (self.target_speed[i] - self.measured.qd[i]);
+            self.presses |= error.abs() > most[i];
+            out[i] += error.clamp(-most[i], most[i]);
         }
         out
     }

@@ -34,6 +34,11 @@ impl Drives {
         }
         self.target += self.target_speed * dt;
     }
+
+    /// Whether the base still rolls.
+    pub(super) fn rolls(&self) -> bool {
+        Rolling::of(self).is_some()
+    }
 }
 
 /// A base that was stopped rolls out for some tenths of a second, and takes the arm's foot along.
