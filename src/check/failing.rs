@@ -14,18 +14,23 @@ use crate::model::codes::COORD_NO_WAY_DOWN;
 use rustc_hash::FxHashSet;
 
 impl Graph<'_, '_> {
+    /// Whether the coordinators have come up in a state, and wait for nothing more.
+    pub(super) fn is_up(&self, at: u32) -> bool {
+        let state = &self.states[at as usize];
+        // What operators ask for there is asked for later.
+        let waits = || self.product.members.iter().any(|member| state.outstanding(member.by) > 0);
+        let heard = state.inbox.is_empty() && state.in_transit.is_empty();
+        heard && !waits() && self.product.all_in(state, |member| member.goal_up())
+    }
+
     /// Which states a deployment comes to before it is up, or has failed.
     pub(super) fn comes_up(&self) -> Vec<bool> {
-        let state = |at: u32| &self.states[at as usize];
-        // What operators ask for there is asked for later.
-        let waits = |at: u32| self.product.members.iter().any(|member| state(at).outstanding(member.by) > 0);
-        let heard = |at: u32| state(at).inbox.is_empty() && state(at).in_transit.is_empty();
-        let is_up = |at: u32| heard(at) && !waits(at) && self.product.all_in(state(at), |member| member.goal_up());
-        let failed = |at: u32| self.product.failed_in(state(at)).is_some();
+        let failed = |at: u32| self.product.failed_in(&self.states[at as usize]).is_some();
+        let stops = |at: u32| self.states[at as usize].stopping;
         // From the first of them on it is being stopped.
-        let leads = |_: usize, edge: &Edge| !is_up(edge.from) && !failed(edge.from) && !state(edge.to).stopping;
+        let leads = |_: usize, edge: &Edge| !self.is_up(edge.from) && !failed(edge.from) && !stops(edge.to);
         let comes_up = self.spread_from(vec![0], leads);
-        (0u32..).zip(comes_up).map(|(at, comes_up)| comes_up && !is_up(at)).collect()
+        (0u32..).zip(comes_up).map(|(at, comes_up)| comes_up && !self.is_up(at)).collect()
     }
 
     /// The states in which a bring-up has failed and rests, with nothing worse than a configuration that was not applied.

@@ -2,6 +2,7 @@
 
 use super::automaton::InterfaceAutomaton;
 use super::bound::Bound;
+use super::driven::DrivenPorts;
 use super::effort::Effort;
 use super::explore::explore;
 use super::judge::Traced;
@@ -17,7 +18,9 @@ use super::{
 };
 use crate::limits;
 use crate::model::codes::{CLASH, POST_ON_DESTROYED, PRE_ON_CREATED, TOUCHES_DESTROYED};
-use crate::model::{Catalogue, Code, ConfigId, Deployment, EventName, Finding, Findings, Severity, StepFault};
+use crate::model::{
+    Catalogue, Code, ConfigId, Deployment, EventName, Finding, Findings, MemberRef, Severity, StepFault,
+};
 use crate::statechart::Chart;
 use rustc_hash::FxHashSet;
 use std::cmp::Reverse;
@@ -60,7 +63,6 @@ fn run_one(
     findings.extend(declared::check(deployment, &universe));
     findings.extend(lets_go::check(deployment, &universe));
     findings.extend(alone::check(deployment));
-    findings.extend(undriven::check(deployment, &universe));
     let written = deployment.charts();
     let mut charts = Vec::new();
     let mut all = 0;
@@ -73,9 +75,11 @@ fn run_one(
     let mut traced: Traced = findings.into_iter().map(|finding| (finding, Vec::new())).collect();
     let mut explored = Explored::default();
     let mut left: BTreeSet<String> = BTreeSet::new();
-    let (mut replayed, mut shows) = (None, None);
+    let (mut replayed, mut shows, mut idle) = (None, None, None);
+    let compiled: Vec<&Chart> = charts.iter().collect();
+    let mut driven_ports = DrivenPorts::new(deployment, (charts.len() == all).then_some(&compiled[..]));
     if charts.len() == all {
-        let charts: Vec<&Chart> = charts.iter().collect();
+        let charts = compiled;
         let mut findings = watched::events(deployment, &charts);
         findings.extend(simulated::events(deployment, &charts));
         findings.extend(unwatched::check(deployment, &universe, &charts));
@@ -104,11 +108,13 @@ fn run_one(
         if !traced.iter().any(|(finding, _)| finding.is_error()) {
             replayed = Some(Accepted::new(shared.clone()));
             let followed = settings::followed(deployment, &universe);
-            let those = Followed { deployment: &followed, views: &views, charts: &charts, catalogue, effort, around };
+            let driven = &driven_ports.by_coordinators()[..];
+            let those =
+                Followed { deployment: &followed, views: &views, charts: &charts, catalogue, effort, around, driven };
             if around.stands_for {
                 explored = Explored { complete: true, without_failure: true, ..Explored::default() };
             } else {
-                (explored, shows) = follow(&those, &mut traced, &mut left);
+                (explored, shows, idle) = follow(&those, &mut traced, &mut left);
             }
             // Where there is an actuator, more is said of it.
             let said = |finding: &crate::model::Finding| {
@@ -118,6 +124,12 @@ fn run_one(
             traced.extend(unhandled.into_iter().map(|finding| (finding, Vec::new())));
         }
     }
+    // Where a request is refused, that is why what it drives is not driven.
+    if let Some(idle) = idle.filter(|_| !traced.iter().any(|(finding, _)| finding.is_error())) {
+        driven_ports.forget(&idle);
+    }
+    let undriven = undriven::check(&universe, &driven_ports);
+    traced.extend(undriven.into_iter().map(|finding| (finding, Vec::new())));
     traced.sort_by_key(|(finding, _)| Reverse(finding.severity));
     let (findings, traces): (Findings, Vec<_>) = traced.into_iter().unzip();
     let left: Vec<String> = left.into_iter().collect();
@@ -135,17 +147,19 @@ struct Followed<'f, 'e> {
     catalogue: &'f Catalogue,
     effort: Effort<'e>,
     around: &'f Neighbours,
+    /// In-ports that coordinators drive, as it is written.
+    driven: &'f [MemberRef],
 }
 
 /// Follows the coordinators, those together that have to do with each other. `left` is told what was left out. Answers also what they show
-/// the parent of their deployment, if it has one and they are all followed together.
+/// the parent of their deployment, if it has one and they are all followed together, and which in-ports nothing drives while it is up.
 fn follow(
     those: &Followed<'_, '_>,
     traced: &mut Traced,
     left: &mut BTreeSet<String>,
-) -> (Explored, Option<Arc<InterfaceAutomaton>>) {
-    let Followed { deployment, views, charts, catalogue, effort, around } = *those;
-    let mut shows = None;
+) -> (Explored, Option<Arc<InterfaceAutomaton>>, Option<FxHashSet<MemberRef>>) {
+    let Followed { deployment, views, charts, catalogue, effort, around, driven } = *those;
+    let (mut shows, mut idle) = (None, None);
     // What functions raise is not known.
     let pure = charts.iter().all(|chart| chart.is_pure());
     let mut explored = Explored { complete: true, without_failure: true, ..Explored::default() };
@@ -261,6 +275,9 @@ fn follow(
             if let Some(parent) = around.parent.as_ref().filter(|_| numbers == all && verified && pure) {
                 shows = graph.derived(parent).map(Arc::new);
             }
+            if pure {
+                idle = graph.undriven_while_up(driven);
+            }
             asked.extend(product.worlds.asked());
             break;
         }
@@ -281,7 +298,7 @@ fn follow(
             None => traced.push((finding, way)),
         }
     }
-    (explored, shows)
+    (explored, shows, idle)
 }
 
 /// Configurations that the coordinator never asks for can still be applied by an operator. Whether they fit the system

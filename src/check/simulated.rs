@@ -87,7 +87,10 @@ fn never_done(fault: &StepFault, deployment: &Deployment, universe: &Universe) -
             ChangeKind::Disconnect { from, to } => Some((from, to)),
             _ => None,
         });
-        let done = links(deployment).into_iter().chain(ended).map(|(from, to)| format!("{from} -> {to}"));
+        let done = links(deployment.configurations.iter())
+            .into_iter()
+            .chain(ended)
+            .map(|(from, to)| format!("{from} -> {to}"));
         (rest.split_once(" (").map_or(rest, |(ends, _)| ends), done.collect())
     } else if verb == "operation_call" {
         let calls = changes().filter_map(|change| match &change.kind {

@@ -1,43 +1,46 @@
-//! In-ports that nothing drives: no configuration connects them or writes them, and no operator may. Where one that is needed is exported
-//! the parent drives it, so the file is a part of something larger.
+//! In-ports that nothing drives while the deployment is up: nothing that may be in force then connects them or writes them, and no operator
+//! may. Where one that is needed is exported the parent drives it, so the file is a part of something larger.
 
-use super::links::links;
+use super::driven::{DrivenPorts, DrivesInVain};
 use super::universe::Universe;
 use crate::model::codes::{DEPLOY_PART, DEPLOY_PORT_REQUIRED, DEPLOY_PORT_UNDRIVEN};
-use crate::model::{
-    Catalogue, ChangeKind, Deployment, Direction, Finding, Findings, MemberRef, OperatorMay, Origin, Severity,
-};
-use rustc_hash::FxHashSet;
+use crate::model::{Catalogue, Deployment, Direction, Finding, Findings, MemberRef, Origin, Severity};
 
 /// Names that a finding shows; the rest is counted.
 const SHOWN: usize = 6;
 
+/// Configurations that a note shows which drive some of its ports, and not while the deployment is up.
+const SHOWN_IN_VAIN: usize = 3;
+
 /// A warning for each that its type declares `required`, and one note of all others.
-pub fn check(deployment: &Deployment, universe: &Universe) -> Findings {
-    let driven = driven(deployment);
+pub fn check(universe: &Universe, driven: &DrivenPorts<'_>) -> Findings {
     let mut components: Vec<_> = universe.components().collect();
     components.sort_unstable_by_key(|name| name.as_str());
     let mut findings = Findings::new();
     let (mut others, mut first): (Vec<MemberRef>, _) = (Vec::new(), Origin::NONE);
+    let mut in_vain: Vec<DrivesInVain> = Vec::new();
     for component in components {
         for creation in universe.of(component) {
             let ports = creation.description.iter().flat_map(|ty| &ty.ports);
             for (name, port) in ports.filter(|(_, port)| port.direction == Direction::In) {
                 let member = component.member(*name);
-                if driven.contains(&member) {
+                if driven.drives(member, creation.ty) {
                     continue;
                 }
+                let vain = driven.in_vain(member);
                 if port.required {
-                    findings.push(required(member, creation.origin, port.origin));
+                    findings.push(required(member, vain, creation.origin, port.origin));
                 } else if !others.contains(&member) {
                     first = if others.is_empty() { creation.origin } else { first };
                     others.push(member);
+                    let new = vain.filter(|of| in_vain.iter().all(|known| known.id != of.id));
+                    in_vain.extend(new);
                 }
             }
         }
     }
     if !others.is_empty() {
-        findings.push(note(&others, first));
+        findings.push(note(&others, &in_vain, first));
     }
     findings
 }
@@ -74,36 +77,56 @@ pub fn part(deployment: &Deployment, catalogue: &Catalogue, severity: Severity) 
     )
 }
 
-/// What some configuration connects or writes, or an operator may set.
-fn driven(deployment: &Deployment) -> FxHashSet<MemberRef> {
-    let changes = deployment.configurations.iter().flat_map(|configuration| &configuration.changes);
-    let written = changes.filter_map(|change| match &change.kind {
-        ChangeKind::PortWrite { port, .. } => Some(*port),
-        _ => None,
-    });
-    let set = deployment.operator.iter().filter_map(|(may, _)| match may {
-        OperatorMay::Set(member) => Some(*member),
-        OperatorMay::Apply(_) => None,
-    });
-    // What is exported is the parent's to drive.
-    let exported = deployment.interface.exports.values().map(|export| export.of);
-    links(deployment).into_iter().map(|(_, to)| to).chain(written).chain(set).chain(exported).collect()
+impl DrivesInVain {
+    /// What it does, for who looks at it.
+    fn told(&self) -> String {
+        match self.asked {
+            true => format!("`{}` does, and not while it is up", self.id),
+            false => format!("`{}` would, and nobody asks for it", self.id),
+        }
+    }
+
+    /// What to do about it.
+    fn help(&self) -> String {
+        match self.asked {
+            true => format!("keep `{}` in force while it is up", self.id),
+            false => format!("let a coordinator ask for `{0}`, or an operator (`operator: [{0}]`)", self.id),
+        }
+    }
 }
 
-fn required(port: MemberRef, created: Origin, declared: Origin) -> Finding {
-    Finding::warning(DEPLOY_PORT_REQUIRED, format!("nothing drives `{port}`, and its component needs it"))
+/// What is driven at some other time, or would be, is not driven while it is up.
+fn while_up(in_vain: bool) -> &'static str {
+    if in_vain { " while the deployment is up" } else { "" }
+}
+
+fn required(port: MemberRef, in_vain: Option<DrivesInVain>, created: Origin, declared: Origin) -> Finding {
+    let while_up = while_up(in_vain.is_some());
+    let message = format!("nothing drives `{port}`{while_up}, and its component needs it");
+    let finding = Finding::warning(DEPLOY_PORT_REQUIRED, message)
         .at(created)
         .labelled("created here")
-        .also(declared, "required here")
-        .help(format!("connect it (`connect(\"…\", \"{port}\")`), or write it (`port_write(\"{port}\", …)`)"))
+        .also(declared, "required here");
+    let help = format!("connect it (`connect(\"…\", \"{port}\")`), or write it (`port_write(\"{port}\", …)`)");
+    match in_vain {
+        Some(of) => finding.also(of.at, of.told()).help(format!("{}; or {help}", of.help())),
+        None => finding.help(help),
+    }
 }
 
-fn note(ports: &[MemberRef], created: Origin) -> Finding {
+fn note(ports: &[MemberRef], in_vain: &[DrivesInVain], created: Origin) -> Finding {
     let names: Vec<String> = ports.iter().take(SHOWN).map(|port| format!("`{port}`")).collect();
     let more = ports.len().saturating_sub(SHOWN);
     let more = if more > 0 { format!(" and {more} more") } else { String::new() };
     let are = if ports.len() == 1 { "an in-port that nothing drives" } else { "in-ports that nothing drives" };
-    Finding::info(DEPLOY_PORT_UNDRIVEN, format!("{}{more}: {are}", names.join(", ")))
-        .at(created)
-        .help("they stay as if never written; connect or write them where that is not meant (a type may say that a port is `required`)")
+    let while_up = while_up(!in_vain.is_empty());
+    let message = format!("{}{more}: {are}{while_up}", names.join(", "));
+    let finding = Finding::info(DEPLOY_PORT_UNDRIVEN, message).at(created);
+    let finding = in_vain.iter().take(SHOWN_IN_VAIN).fold(finding, |finding, of| finding.also(of.at, of.told()));
+    finding.help(match in_vain.first() {
+        Some(of) => format!("they stay as if never written then; where that is not meant, {}", of.help()),
+        None => "they stay as if never written; connect or write them where that is not meant (a type may say that a port is \
+                 `required`)"
+            .to_owned(),
+    })
 }

@@ -596,12 +596,17 @@ codes! {
         "`platform: { NAME: { … } }` gives the platform options. Which ones there are, of which type, and which must be given, is \
          what the program says that brings the platform. The built-in platforms have none.";
     DEPLOY_PORT_REQUIRED = "deploy::port_required", "nothing drives an in-port that its component needs",
-        "The component's type declares the in-port `required: true`: without samples the component cannot do what it is there for. No \
-         configuration of the deployment connects or writes it, and no operator may set it. Connect it to an out-port, or write it.";
+        "The component's type declares the in-port `required: true`: without samples the component cannot do what it is there for. Nothing \
+         that may be in force while the deployment is up connects or writes it: no configuration that a coordinator asks for, none that an \
+         operator may apply (`operator:`, `safe`), and no operator may set it. One that nobody may ask for drives nothing, and neither does \
+         one that is undone before it is up, or applied when it goes down; one that is in force in some mode only does. Connect it to an \
+         out-port, or write it, or ask for what does.";
     DEPLOY_PORT_UNDRIVEN = "deploy::port_undriven", "nothing drives some in-ports",
-        "No configuration of the deployment connects or writes these in-ports, and no operator may set them: their components see \
-         them as never written. That is often meant (an input that this system does not use), and now and then a connection that was \
-         forgotten or misspelt. A type that cannot do without says `required: true` of its port: then it is a warning.";
+        "Nothing that may be in force while the deployment is up connects or writes these in-ports: no configuration that a coordinator \
+         asks for, none that an operator may apply (`operator:`, `safe`), and no operator may set them. One that nobody may ask for drives \
+         nothing, and neither does one that is undone before it is up, or applied when it goes down. Their components see them as never \
+         written. That is often meant (an input that this system does not use), and now and then a connection that was forgotten or \
+         misspelt. A type that cannot do without says `required: true` of its port: then it is a warning.";
     DEPLOY_UNWATCHED = "deploy::unwatched", "part of what commands an actuator may die unnoticed",
         "A component whose activity hangs, or that was stopped by hand, sends nothing any more; whoever receives its data goes on with \
          the last value. Where there is an actuator this is told of components that a configuration starts: those whose data reach it, over as \

@@ -194,33 +194,6 @@ fn what_moves_and_is_brought_to_rest_by_nothing_is_noted() {
     assert!(named.of("deploy::no_rest").is_empty(), "{:#}", named.0);
 }
 
-/// A note of all in-ports that nothing drives, a warning of each that its type says it needs.
-#[test]
-fn what_nothing_drives_is_told() {
-    let small = Small::new(CONFIGURATIONS, STATES, "");
-    let said = small.check();
-    assert_eq!(texts(&said, "deploy::port_undriven")[0].0, "`a.in`: an in-port that nothing drives");
-    assert_eq!(said.0["verdict"], "sound", "{:#}", said.0);
-    small.demo.replace(
-        "small.yaml",
-        "in: { direction: in, type: float }",
-        "in: { direction: in, type: float, required: true }",
-    );
-    let said = small.check();
-    assert!(said.of("deploy::port_undriven").is_empty(), "{:#}", said.0);
-    let (message, help) = &texts(&said, "deploy::port_required")[0];
-    assert!(message.contains("nothing drives `a.in`") && help.contains("port_write(\"a.in\", …)"), "{message}; {help}");
-    assert_eq!(said.0["verdict"], "warnings", "{:#}", said.0);
-    // A configuration that writes it, or an operator who may set it, drives it.
-    let written = format!("{CONFIGURATIONS} feed = Configuration {{ port_write('a.in', 1.0) }},");
-    small.demo.write("conf.lua", &format!("ConfiguratorConf {{ {written} }}"));
-    let said = small.check();
-    assert!(said.of("deploy::port_required").is_empty() && said.of("deploy::port_undriven").is_empty(), "{:#}", said.0);
-    small.demo.write("conf.lua", &format!("ConfiguratorConf {{ {CONFIGURATIONS} }}"));
-    small.demo.replace("small.yaml", "coordinator:", "operator: [a.in]\ncoordinator:");
-    assert!(small.check().of("deploy::port_required").is_empty());
-}
-
 #[test]
 fn a_group_that_is_misspelt_is_told() {
     let told = |first: &str, second: &str, third: &str| {

@@ -28,4 +28,5 @@ mod shown;
 mod stopping;
 mod support;
 mod sure;
+mod undriven;
 mod verdicts;

@@ -126,7 +126,7 @@ pub static PORT: Object = Object {
         key(
             "required",
             Form::Truth,
-            "Whether something has to drive the in-port: `davit check` warns where no configuration connects or writes it.",
+            "Whether something has to drive the in-port: `davit check` warns where nothing that may be in force while the deployment is up connects or writes it.",
             "required: true",
             ("required: yes", TEXT_WRONG_TYPE),
         )
