@@ -162,12 +162,7 @@ fn one(out: &Output, ty: &ComponentType) {
     }
     let mut table = Table::new(2);
     for (name, property) in &ty.properties {
-        let limits = match (property.min, property.max) {
-            (Some(min), Some(max)) => format!("{min} … {max}"),
-            (Some(min), None) => format!("≥ {min}"),
-            (None, Some(max)) => format!("≤ {max}"),
-            (None, None) => String::new(),
-        };
+        let limits = between(property.min, property.max);
         let default = property.default.as_ref().map_or_else(|| "required".to_owned(), |v| format!("= {v}"));
         let unit = property.unit.as_deref().unwrap_or_default().to_owned();
         table.row([
@@ -210,12 +205,25 @@ fn one(out: &Output, ty: &ComponentType) {
     section(out, "injections (of scripts, where its code runs in this process)", &table);
 }
 
+/// Limits, as they are shown.
+fn between(min: Option<f64>, max: Option<f64>) -> String {
+    match (min, max) {
+        (Some(min), Some(max)) => format!("{min} … {max}"),
+        (Some(min), None) => format!("≥ {min}"),
+        (None, Some(max)) => format!("≤ {max}"),
+        (None, None) => String::new(),
+    }
+}
+
 /// What can be made to go wrong in a component of the type.
 fn injections(ty: &ComponentType) -> Vec<[String; 2]> {
     let own = ty.injections.iter().map(|(name, injection)| {
         let one = |p: &InjectionParameter| {
             let default = p.default.as_ref().map_or_else(String::new, |value| format!(" = {value}"));
-            format!("{}: {}{default}", p.name, p.ty)
+            let unit = p.unit.as_deref().map_or_else(String::new, |unit| format!(" {unit}"));
+            let limits = between(p.min, p.max);
+            let limits = if limits.is_empty() { limits } else { format!(" ({limits})") };
+            format!("{}: {}{default}{unit}{limits}", p.name, p.ty)
         };
         let parameters: Vec<String> = injection.parameters.iter().map(one).collect();
         [format!("{name}({})", parameters.join(", ")), injection.doc.clone()]

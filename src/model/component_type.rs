@@ -231,19 +231,29 @@ impl PropertyType {
     /// # Errors
     /// `ValueError`, naming the number or element at fault.
     pub fn fit(&self, value: Value) -> Result<Value, ValueError> {
-        let value = value.fit(&self.ty)?;
-        let mut bad = None;
-        if self.min.is_some() || self.max.is_some() {
-            value.for_each_number(&mut |n| {
-                if bad.is_none() && (self.min.is_some_and(|m| n < m) || self.max.is_some_and(|m| n > m)) {
-                    bad = Some(n);
-                }
-            });
-        }
-        match bad {
-            Some(value) => Err(ValueError::Range { value, min: self.min, max: self.max }),
-            None => Ok(value),
-        }
+        fit_within(value, &self.ty, self.min, self.max)
+    }
+}
+
+/// `value` as a value of the type `ty` in which every number is within the limits.
+pub(super) fn fit_within(
+    value: Value,
+    ty: &ValueType,
+    min: Option<f64>,
+    max: Option<f64>,
+) -> Result<Value, ValueError> {
+    let value = value.fit(ty)?;
+    let mut bad = None;
+    if min.is_some() || max.is_some() {
+        value.for_each_number(&mut |n| {
+            if bad.is_none() && (min.is_some_and(|m| n < m) || max.is_some_and(|m| n > m)) {
+                bad = Some(n);
+            }
+        });
+    }
+    match bad {
+        Some(value) => Err(ValueError::Range { value, min, max }),
+        None => Ok(value),
     }
 }
 

@@ -1,12 +1,13 @@
 //! What can be made to go wrong in a component, as the world would do it: declared by its type, or the same in every component
 //! whose code runs here.
 
-use super::component_type::ComponentType;
+use super::component_type::{ComponentType, ValueError, fit_within};
 use super::finding::did_you_mean;
 use super::names::Ident;
 use super::value::{Value, ValueType};
 use serde::Serialize;
 use std::fmt;
+use std::sync::Arc;
 use std::time::Duration;
 
 /// Something that a type declares to be injected.
@@ -28,6 +29,15 @@ pub struct InjectionParameter {
     pub ty: ValueType,
     /// Its value where none is given; without one it must be given.
     pub default: Option<Value>,
+    /// Smallest value allowed, of every number in it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub min: Option<f64>,
+    /// Largest value allowed, of every number in it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max: Option<f64>,
+    /// The unit, if it states one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unit: Option<Arc<str>>,
 }
 
 /// What happens to one component.
@@ -39,6 +49,8 @@ pub enum Injection {
         name: Ident,
         /// The values, in the order of the parameters.
         values: Vec<Value>,
+        /// Those of them that were not left out, by name: so it is told.
+        given: Vec<(Ident, Value)>,
     },
     /// Its code does not return any more; with an operation, from the next call of that one on.
     Hang {
@@ -92,6 +104,9 @@ impl Injection {
             name: Ident::new(name).expect("a parameter's name"),
             ty,
             default,
+            min: None,
+            max: None,
+            unit: None,
         };
         match name {
             "panic" => fit(name, &[], given).map(|_| Self::Panic),
@@ -119,7 +134,13 @@ impl Injection {
             }
             _ => match ty.injections.iter().find(|(known, _)| known.as_str() == name) {
                 Some((known, declared)) => {
-                    Ok(Self::Declared { name: *known, values: fit(name, &declared.parameters, given)? })
+                    let values = fit(name, &declared.parameters, given)?;
+                    // In the order of the parameters: a table of Lua has none.
+                    let told = declared.parameters.iter().zip(&values);
+                    let told =
+                        told.filter(|(parameter, _)| given.iter().any(|(name, _)| parameter.name.as_str() == name));
+                    let given = told.map(|(parameter, value)| (parameter.name, value.clone())).collect();
+                    Ok(Self::Declared { name: *known, values, given })
                 }
                 None => {
                     let declared = ty.injections.keys().map(Ident::as_str);
@@ -142,9 +163,16 @@ fn fit(name: &str, parameters: &[InjectionParameter], given: &[(String, Value)])
         let value = given.iter().find(|(given, _)| parameter.name.as_str() == given).map(|(_, value)| value.clone());
         let (name_of, ty) = (parameter.name, &parameter.ty);
         match (value, &parameter.default) {
-            (Some(value), _) => match value.fit(ty) {
+            (Some(value), _) => match fit_within(value, ty, parameter.min, parameter.max) {
                 Ok(value) => Ok(value),
-                Err(why) => no(format!("`{name_of}` of `{name}`: {why}"), format!("give a value of the type {ty}")),
+                Err(why) => {
+                    let help = match (&why, parameter.min, parameter.max) {
+                        (ValueError::Range { .. }, Some(min), Some(max)) => format!("give a value from {min} to {max}"),
+                        (ValueError::Range { .. }, ..) => "give a value within that".to_owned(),
+                        _ => format!("give a value of the type {ty}"),
+                    };
+                    no(format!("`{name_of}` of `{name}`: {why}"), help)
+                }
             },
             (None, Some(default)) => Ok(default.clone()),
             (None, None) => no(format!("`{name}` needs `{name_of}`"), format!("give it: {{ {name_of} = … }}, a {ty}")),
@@ -157,9 +185,12 @@ fn fit(name: &str, parameters: &[InjectionParameter], given: &[(String, Value)])
 impl fmt::Display for Injection {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Declared { name, values } => {
-                write!(f, "{name}")?;
-                values.iter().try_for_each(|value| write!(f, " {value}"))
+            Self::Declared { name, given, .. } => {
+                let one = |(name, value): &(Ident, Value)| format!("{name} = {value}");
+                match given.is_empty() {
+                    true => write!(f, "{name}"),
+                    false => write!(f, "{name} {{{}}}", given.iter().map(one).collect::<Vec<_>>().join(", ")),
+                }
             }
             Self::Hang { operation: None } => f.write_str("hang"),
             Self::Hang { operation: Some(operation) } => write!(f, "hang of {operation}"),
@@ -176,22 +207,29 @@ mod tests {
     #[test]
     fn what_does_not_fit_says_what_would() {
         let mut ty = ComponentType::new("Drive", "");
-        let joint =
-            InjectionParameter { name: Ident::new("joint").unwrap(), ty: ValueType::Int, default: Some(Value::Int(1)) };
+        let joint = InjectionParameter {
+            name: Ident::new("joint").unwrap(),
+            ty: ValueType::Int,
+            default: Some(Value::Int(0)),
+            min: Some(0.0),
+            max: Some(5.0),
+            unit: None,
+        };
         let declared = InjectionType { parameters: vec![joint], doc: String::new() };
         ty.injections.insert(Ident::new("overcurrent").unwrap(), declared);
         let of = |name: &str, given: &[(&str, Value)]| {
             let given: Vec<_> = given.iter().map(|(name, value)| ((*name).to_owned(), value.clone())).collect();
             Injection::of(&ty, name, &given).map(|it| it.to_string()).map_err(|why| why.to_string())
         };
-        assert_eq!(of("overcurrent", &[]), Ok("overcurrent 1".to_owned()));
-        assert_eq!(of("overcurrent", &[("joint", Value::Int(3))]), Ok("overcurrent 3".to_owned()));
+        assert_eq!(of("overcurrent", &[]), Ok("overcurrent".to_owned()));
+        assert_eq!(of("overcurrent", &[("joint", Value::Int(3))]), Ok("overcurrent {joint = 3}".to_owned()));
         assert_eq!(of("stall", &[("seconds", Value::Int(1))]), Ok("stall of 1 s".to_owned()));
         for (name, given, says) in [
             ("overcurent", vec![], "can be injected into Drive: did you mean `overcurrent`?"),
             ("panik", vec![], "did you mean `panic`?"),
             ("overcurrent", vec![("jiont", Value::Int(1))], "has no parameter `jiont`: did you mean `joint`?"),
             ("overcurrent", vec![("joint", Value::str("a"))], "`joint` of `overcurrent`: expected int"),
+            ("overcurrent", vec![("joint", Value::Int(6))], "6 is outside 0 … 5: give a value from 0 to 5"),
             ("stall", vec![], "`stall` needs `seconds`"),
             ("stall", vec![("seconds", Value::Float(-1.0))], "a stall of -1 s"),
             ("hang", vec![("operation", Value::str("fold"))], "Drive has no operation `fold`"),

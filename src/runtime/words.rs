@@ -119,11 +119,15 @@ impl<C: Component> Builder<C> {
         self.words(|w| w.moves = true)
     }
 
-    /// A parameter of the injection that comes next, which takes them in this order; without a default it must be given.
+    /// A parameter of the injection that comes next, which takes them in this order; without a default it must be given. Unit and limits that
+    /// were said before it are its own.
     pub fn parameter<T: PortValue>(&mut self, name: &str, default: Option<T>) -> &mut Self {
         let name = ident(name);
         let default = default.map(|value| value.to_value());
-        self.words(|w| w.parameters.push(InjectionParameter { name, ty: T::value_type(), default }))
+        self.words(|w| {
+            let (min, max, unit) = (w.min.take(), w.max.take(), w.unit.take());
+            w.parameters.push(InjectionParameter { name, ty: T::value_type(), default, min, max, unit });
+        })
     }
 
     /// Something that can be made to go wrong in the component, at any moment, in the middle of an operation too: a fault of

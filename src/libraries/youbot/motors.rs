@@ -38,8 +38,8 @@ pub struct HeatLimit {
 /// What the limit did.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum HeatChange {
-    /// A first motor is limited.
-    Exceeded,
+    /// A first motor is limited: of this joint, counted from 0.
+    Exceeded(usize),
     /// None is any more.
     Exit,
 }
@@ -52,7 +52,8 @@ impl HeatLimit {
 
     /// They give `torque` for `dt` seconds, with `most` as their largest (N m).
     pub fn update(&mut self, torque: &J5, most: &J5, dt: f64) -> Option<HeatChange> {
-        let before = self.limited.contains(&true);
+        let limited = |it: &Self| it.limited.iter().position(|limited| *limited);
+        let before = limited(self);
         for i in 0..JOINTS {
             let share = if most[i] > 0.0 { torque[i] / most[i] } else { 0.0 };
             self.used[i] = (self.used[i] + (share * share - LASTING * LASTING) * dt).max(0.0);
@@ -60,9 +61,9 @@ impl HeatLimit {
             // Rounding must not let a motor that gives the lasting torque stay limited for ever.
             self.limited[i] = if self.limited[i] { self.used[i] > 1e-3 * room } else { self.used[i] >= room - 1e-9 };
         }
-        match (before, self.limited.contains(&true)) {
-            (false, true) => Some(HeatChange::Exceeded),
-            (true, false) => Some(HeatChange::Exit),
+        match (before, limited(self)) {
+            (None, Some(joint)) => Some(HeatChange::Exceeded(joint)),
+            (Some(_), None) => Some(HeatChange::Exit),
             _ => None,
         }
     }
@@ -91,7 +92,7 @@ mod tests {
             (at, heat.of(&most)[1] / most[1])
         };
         assert_eq!(give(LASTING, 60.0), (None, 1.0));
-        assert_eq!(give(1.0, 2.0), (Some((499, HeatChange::Exceeded)), LASTING));
+        assert_eq!(give(1.0, 2.0), (Some((499, HeatChange::Exceeded(0))), LASTING));
         let (back, share) = give(0.5, 2.0);
         assert!(matches!(back, Some((400..500, HeatChange::Exit))) && share == 1.0, "{back:?}");
     }

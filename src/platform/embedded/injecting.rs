@@ -64,7 +64,7 @@ fn asked(cell: &Cell, injection: &Injection) -> Result<Option<CellRequest>, Stri
             cell.trap(index.map_err(|_| format!("`{}` has no operation `{operation}`", cell.name))?);
             return Ok(None);
         }
-        Injection::Declared { name, values } => {
+        Injection::Declared { name, values, .. } => {
             let declared = cell.kind.ty.injections.iter().enumerate().find(|(_, (known, _))| *known == name);
             let (index, (_, declared)) =
                 declared.ok_or_else(|| format!("nothing called `{name}` can be injected into `{}`", cell.name))?;

@@ -176,7 +176,7 @@ impl Component for Driver {
                 )
                 .property("heat_limit", false),
             comm_fault: b
-                .doc(&format!("Fault to inject: none, {}.", FAULTS.map(|(name, ..)| name).join(", ")))
+                .doc(&format!("Fault to inject: none, {}.", FAULTS.each_ref().map(|fault| fault.name).join(", ")))
                 .property("comm_fault", "none".to_owned()),
             ifname: b
                 .doc("The network interface of the field bus.")
@@ -195,7 +195,7 @@ impl Component for Driver {
                 dropped: b.event("e_arm_dropped"),
                 emergency: b.event("e_EMERGENCY_STOP"),
                 unwatched: b.event("e_watch_lost"),
-                faults: FAULTS.map(|(_, event, _)| b.event(event)),
+                faults: FAULTS.each_ref().map(|fault| b.event(fault.event)),
             },
             drives: Drives::new(radians(PARK_POSE_DEG)),
             running: false,
@@ -277,7 +277,7 @@ impl Component for Driver {
             self.heat = HeatLimit::default();
         } else if let Some(change) = self.heat.update(&driven.torque, &most, cx.dt()) {
             match change {
-                HeatChange::Exceeded => _ = self.fail(I2T),
+                HeatChange::Exceeded(joint) => _ = self.fail_at(I2T, Some(joint)),
                 HeatChange::Exit => self.events.raise(self.names.cooled),
             }
         }

@@ -79,6 +79,8 @@ crate::runtime::record! {
         pub temp: [f64; 5],
         /// As the drives' firmware counts them; 0 is none.
         pub error_flags: i64,
+        /// The same of each joint's motor, as far as it is told whose they are.
+        pub joint_error_flags: [i64; 5],
     }
 
     /// How the field bus is.

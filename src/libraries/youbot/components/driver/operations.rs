@@ -2,9 +2,9 @@
 
 use super::Driver;
 use super::bus::NO_ARM;
-use super::faults::{FAULT_WORDS, FAULTS};
 use crate::libraries::youbot::drives::{DriveMode, Drives};
-use crate::runtime::{Builder, Context, Failure, OperationAnswer};
+use crate::libraries::youbot::parameters::JOINTS;
+use crate::runtime::{Builder, Context, OperationAnswer};
 
 /// Why a driver that has died does nothing.
 const DIED: &str = "the driver has died: what its drives do is not known";
@@ -59,7 +59,7 @@ impl Driver {
         b.doc("Forgets the drives' error flags.").no_effect().operation(
             "clear_faults",
             alive(|c, _, (): ()| {
-                c.motors.error_flags = 0;
+                (c.motors.error_flags, c.motors.joint_error_flags) = (0, [0; JOINTS]);
                 OperationAnswer::Done(())
             }),
         );
@@ -117,13 +117,7 @@ impl Driver {
                 OperationAnswer::Done(())
             }),
         );
-        for (fault, what) in FAULTS.iter().zip(FAULT_WORDS) {
-            let name = fault.0;
-            b.doc(what).injection(name, move |c, _, (): ()| match c.fail(name) {
-                true => Ok(()),
-                false => Err(Failure(format!("no fault `{name}`"))),
-            });
-        }
+        Self::offer_faults(b);
     }
 
     /// Begins something that takes many updates; its ticket answers when it has ended.
