@@ -49,6 +49,17 @@ fn a_budget_says_how_much_is_followed() {
     let told = with("20k,1MB");
     assert!(told["left"].to_string().contains("more memory than `--budget` gives"), "{told}");
     assert_eq!(told["explored"]["complete"], false, "{told}");
+    let (few, all) = (with("1Kstates"), with("1G"));
+    let states = |of: &serde_json::Value| of["explored"]["states"].as_u64().expect("a number");
+    assert!((600..1_100).contains(&states(&few)) && states(&all) > 1_100, "{few}, {all}");
+    let told = few["left"].to_string();
+    assert!(told.contains("after the first 1000 states was not followed") && !told.contains("transitions"), "{told}");
+    // Of two bounds that is told which is met.
+    let told = with("300,1Mstates")["left"].to_string();
+    assert!(told.contains("after the first 300 transitions") && !told.contains("states was"), "{told}");
+    assert_eq!(with("1000000,100Mstates")["left"], all["left"]);
+    let ran = demo.run(&["check", "deployment.yaml", "--budget", "1kstates"]);
+    assert!(ran.out.contains("not followed further: the budget is 1000 states, and"), "{}", ran.out);
     let ran = demo.run(&["check", "deployment.yaml", "--budget", "1k"]);
     assert!(ran.out.contains("the budget is 1000 transitions"), "{}", ran.out);
 }
@@ -56,7 +67,13 @@ fn a_budget_says_how_much_is_followed() {
 #[test]
 fn a_budget_that_is_none_is_told() {
     for (budget, told) in [
-        ("lots", "a number of transitions (`2000000`, `2M`), memory (`2GB`), or `2M,2GB`"),
+        (
+            "lots",
+            "a number of transitions (`2000000`, `2M`), states (`500Kstates`), memory (`2GB`), or several, each once: `2M,2GB`",
+        ),
+        ("2states,3states", "`3states`: a number of transitions"),
+        ("2GBstates", "`2GBstates`: a number of transitions"),
+        ("0states", "`0states`: between 1 and 1000000000 states"),
         ("2M,3M", "`3M`: a number of transitions"),
         ("0", "between 1 and 1000000000 transitions"),
         ("99999999999999999999", "a number of transitions"),
@@ -139,7 +156,7 @@ fn a_terminal_is_told_how_far_it_is() {
             number.parse::<u64>().unwrap_or_else(|_| panic!("no number before `{unit}`: {line}"))
         };
         whole
-            .map(|line| (of(line, " states, "), of(line, " transitions of "), of(line, " states/s")))
+            .map(|line| (of(line, " states, "), of(line, " of 1000000000 transitions; "), of(line, " states/s")))
             .collect::<BTreeSet<_>>()
     };
     while lines(&text).len() < 3 {
@@ -153,7 +170,6 @@ fn a_terminal_is_told_how_far_it_is() {
     let told: Vec<_> = lines(&text).into_iter().collect();
     assert!(told.windows(2).all(|pair| pair[0].0 < pair[1].0 && pair[0].1 < pair[1].1), "it goes on: {told:?}");
     assert!(told.iter().all(|(states, transitions, rate)| states < transitions && *rate > 0), "{told:?}");
-    assert!(text.contains(" of 1000000000 transitions; "), "{text}");
     let behind = text.rsplit("what was found so far").next().unwrap_or_default();
     assert!(behind.contains("\u{1b}[2K"), "the line is taken away: {text:?}");
     assert!(!demo.read("out").contains("following"), "{}", demo.read("out"));
