@@ -1,5 +1,6 @@
 //! Bounds of what is followed, and what is said of those that cut something off.
 
+use super::effort::Effort;
 use super::state::Failed;
 use crate::limits;
 
@@ -8,6 +9,8 @@ use crate::limits;
 pub enum Bound {
     /// The transitions of an [`Effort`](super::Effort).
     Budget,
+    /// The states of one.
+    States,
     /// [`Halt::Memory`](super::Halt).
     Memory,
     /// [`Halt::Interrupted`](super::Halt).
@@ -71,11 +74,16 @@ pub enum Bound {
 
 impl Bound {
     /// What a bound left out; `failed` is what had to fail before, at least, and so many batches of a coordinator waited.
-    pub(super) fn told(self, failed: Failed, most_waiting: usize, budget: usize) -> String {
+    pub(super) fn told(self, failed: Failed, most_waiting: usize, effort: &Effort<'_>) -> String {
         let what = match self {
             Self::Budget => format!(
-                "what comes after the first {budget} transitions was not followed, for they are as many as are looked at \
-                 (`--budget`)"
+                "what comes after the first {} transitions was not followed, for they are as many as are looked at \
+                 (`--budget`)",
+                effort.transitions
+            ),
+            Self::States => format!(
+                "what comes after the first {} states was not followed, for they are as many as are looked at (`--budget`)",
+                effort.states
             ),
             Self::Memory => "what takes up more memory than `--budget` gives was not followed".to_owned(),
             Self::Interrupted => "what was left when it was interrupted was not followed".to_owned(),

@@ -25,6 +25,8 @@ pub enum Halt {
 pub struct Effort<'e> {
     /// So many transitions of coordinators that are followed together, at most.
     pub transitions: usize,
+    /// So many states of coordinators that are followed together, at most.
+    pub states: usize,
     /// What failed undos leave is known one at a time where so many configurations may be left, at least ([`undo_failed`](super::undo_failed)); where
     /// they are fewer, following every subset of them is less.
     pub aside_from: usize,
@@ -37,10 +39,11 @@ pub struct Effort<'e> {
 }
 
 impl Default for Effort<'_> {
-    /// [`limits::CHECK_TRANSITIONS`], and to the end.
+    /// [`limits::CHECK_TRANSITIONS`], any number of states, and to the end.
     fn default() -> Self {
         Self {
             transitions: limits::CHECK_TRANSITIONS,
+            states: usize::MAX,
             aside_from: limits::CHECK_ASIDE,
             together: false,
             goes_on: &|_| Ok(()),
@@ -69,6 +72,11 @@ impl Left<'_> {
     /// So many transitions at most.
     pub fn transitions(&self) -> usize {
         self.effort.transitions
+    }
+
+    /// So many states at most.
+    pub fn states(&self) -> usize {
+        self.effort.states
     }
 
     /// Why it ended, once it has.

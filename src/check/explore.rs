@@ -129,7 +129,7 @@ pub fn explore<'p, 'a>(product: &'p mut Product<'a>) -> Graph<'p, 'a> {
     graph
 }
 
-/// How many transitions are followed before those with at worst this failing come to their end: what fails is to be looked
+/// How many transitions, or states, are followed before those with at worst this failing come to their end: what fails is to be looked
 /// at also where there is no end to what does not.
 fn share_of(failed: Failed, of: usize) -> usize {
     let eighths = match failed {
@@ -159,8 +159,17 @@ impl Graph<'_, '_> {
                 self.cut(Bound::Budget, failed);
                 continue;
             }
+            if self.states.len() >= share_of(failed, self.product.effort.states()) {
+                self.cut(Bound::States, failed);
+                continue;
+            }
             self.expand(at, failed);
         }
+    }
+
+    /// Whether there is more of it than is to be followed.
+    pub(super) fn is_used_up(&self) -> bool {
+        [Bound::Budget, Bound::States].iter().any(|bound| self.bounds.contains_key(bound))
     }
 
     /// Something was left out that comes where at worst this failed.

@@ -3,8 +3,8 @@
 
 use crate::model::codes::TYPE_DIFFERS;
 use crate::model::{
-    Catalogue, ChangeKind, ComponentType, Deployment, Effect, Finding, Findings, Ident, OperationType, Origin,
-    PortType, PropertyType, Tunable, TypeName, ValueType,
+    Catalogue, ComponentType, Deployment, Effect, Finding, Findings, Ident, OperationType, Origin, PortType,
+    PropertyType, Tunable, TypeName, ValueType,
 };
 use rustc_hash::FxHashSet;
 use std::collections::BTreeMap;
@@ -29,15 +29,14 @@ pub fn platform(deployment: &Deployment, catalogue: &Catalogue, platform: &Catal
     let changes = deployment.configurations.iter().flat_map(|configuration| &configuration.changes);
     let mut seen = FxHashSet::default();
     for change in changes {
-        let (ChangeKind::Create { ty, .. } | ChangeKind::Replace { ty, .. }) = &change.kind else { continue };
-        let Some(checked) = catalogue.get(*ty).filter(|_| seen.insert(*ty)) else { continue };
-        let Some(own) = platform.get(*ty) else {
+        let Some((_, ty, _)) = change.kind.makes() else { continue };
+        let Some(checked) = catalogue.get(ty).filter(|_| seen.insert(ty)) else { continue };
+        let Some(own) = platform.get(ty) else {
             let message = format!("the platform `{}` has no type `{ty}`", deployment.platform);
             findings.push(Finding::error(TYPE_DIFFERS, message).at(change.origin));
             continue;
         };
-        Compared { ty: *ty, origin: checked.origin, by: TypeOwner::Platform, findings: &mut findings }
-            .types(checked, own);
+        Compared { ty, origin: checked.origin, by: TypeOwner::Platform, findings: &mut findings }.types(checked, own);
     }
     findings.retain(Finding::is_error);
     findings

@@ -43,7 +43,15 @@ impl Graph<'_, '_> {
         how(self.product);
         let mut probe = explore(self.product);
         // Other bounds leave out what has little to do with it.
-        let ends = [Bound::Budget, Bound::Memory, Bound::Interrupted, Bound::Entered, Bound::Inbox, Bound::Forks];
+        let ends = [
+            Bound::Budget,
+            Bound::States,
+            Bound::Memory,
+            Bound::Interrupted,
+            Bound::Entered,
+            Bound::Inbox,
+            Bound::Forks,
+        ];
         let more = ends.iter().any(|bound| probe.bounds.contains_key(bound) && !self.bounds.contains_key(bound));
         let differs = more || probe.judge().iter().any(|(finding, _)| finding.severity > Severity::Info);
         self.product.effort = effort;

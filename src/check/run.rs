@@ -180,18 +180,18 @@ fn follow(
     }
     let mut asked = product.worlds.asked().clone();
     if product.untimed {
-        left.insert(Bound::Times.told(Failed::Nothing, 0, effort.transitions));
+        left.insert(Bound::Times.told(Failed::Nothing, 0, &effort));
     }
     for (bound, _) in [(Bound::Ties, product.tied), (Bound::Turns, product.unordered)].iter().filter(|(_, is)| *is) {
-        left.insert(bound.told(Failed::Nothing, 0, effort.transitions));
+        left.insert(bound.told(Failed::Nothing, 0, &effort));
         explored.complete = false;
     }
     if groups.len() > 1 && !coupling::by_operator(deployment).is_empty() {
-        left.insert(Bound::Begun.told(Failed::Nothing, 0, effort.transitions));
+        left.insert(Bound::Begun.told(Failed::Nothing, 0, &effort));
         explored.complete = false;
     }
     if coupling::is_tied(deployment, catalogue, charts, &groups) {
-        left.insert(Bound::Tied.told(Failed::Nothing, 0, effort.transitions));
+        left.insert(Bound::Tied.told(Failed::Nothing, 0, &effort));
         explored.complete = false;
     }
     for numbers in groups {
@@ -208,7 +208,7 @@ fn follow(
             product.follow_anew(most_waiting);
             product.effort = product.most_believed();
             let mut graph = explore(product);
-            if graph.product.knows_children() && graph.bounds.contains_key(&Bound::Budget) {
+            if graph.product.knows_children() && graph.is_used_up() {
                 // With all that is known of them there is too much of it.
                 graph.product.forget_children();
                 graph.product.follow_with(effort);
@@ -236,7 +236,7 @@ fn follow(
                 product.follows_by_hand = true;
                 continue;
             }
-            if graph.product.follows_by_hand && graph.bounds.contains_key(&Bound::Budget) {
+            if graph.product.follows_by_hand && graph.is_used_up() {
                 // It was not.
                 (by_hand, product.follows_by_hand) = (false, false);
                 continue;
@@ -264,13 +264,11 @@ fn follow(
             }
             found.extend(graph.judge());
             graph.probe(&found);
-            let cut = [Bound::Budget, Bound::Memory, Bound::Interrupted, Bound::Entered];
+            let cut = [Bound::Budget, Bound::States, Bound::Memory, Bound::Interrupted, Bound::Entered];
             let verified = !cut.iter().any(|bound| graph.bounds.contains_key(bound));
             let shared = coupling::shared(deployment, charts, &numbers, verified);
             found.extend(shared.into_iter().map(|finding| (finding, Vec::new())));
-            left.extend(
-                graph.bounds.iter().map(|(bound, failed)| bound.told(*failed, most_waiting, effort.transitions)),
-            );
+            left.extend(graph.bounds.iter().map(|(bound, failed)| bound.told(*failed, most_waiting, &effort)));
             explored = explored.and(graph.explored());
             if let Some(parent) = around.parent.as_ref().filter(|_| numbers == all && verified && pure) {
                 shows = graph.derived(parent).map(Arc::new);

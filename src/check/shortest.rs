@@ -106,7 +106,8 @@ fn search(
             reached = Some(at);
             break;
         }
-        let (met, most) = (states.len(), product.effort.transitions().max(product.most_driven));
+        let followed = product.effort.transitions().min(product.effort.states());
+        let (met, most) = (states.len(), followed.max(product.most_driven));
         if met > most || !product.effort.goes_on(at, Far { states: met, transitions: at }) {
             unfollowed = true;
             break;

@@ -21,13 +21,15 @@ use std::time::Duration;
 pub struct CheckBudget {
     /// Transitions of coordinators that are followed together.
     pub transitions: usize,
+    /// States of them; none: any.
+    pub states: Option<usize>,
     /// Bytes of memory that the process takes up; none: any.
     pub memory: Option<u64>,
 }
 
 impl Default for CheckBudget {
     fn default() -> Self {
-        Self { transitions: limits::CHECK_TRANSITIONS, memory: None }
+        Self { transitions: limits::CHECK_TRANSITIONS, states: None, memory: None }
     }
 }
 
@@ -52,6 +54,18 @@ fn number(text: &str, units: &[(&str, u64)]) -> Option<u64> {
     whole.parse::<u64>().ok()?.checked_mul(*times)?.checked_add(part)
 }
 
+/// A number of states: what is written before that word.
+fn states(text: &str) -> Option<u64> {
+    let upper = text.trim().to_ascii_uppercase();
+    number(upper.strip_suffix("STATES").or_else(|| upper.strip_suffix("STATE"))?, &TIMES)
+}
+
+/// As many as can be followed. With who is told otherwise: what was written, and of what.
+fn followed(part: &str, most: u64, of: &str) -> Result<usize, String> {
+    let most = usize::try_from(most).ok().filter(|n| (1..=limits::CHECK_TRANSITIONS_MOST).contains(n));
+    most.ok_or_else(|| format!("`{part}`: between 1 and {} {of}", limits::CHECK_TRANSITIONS_MOST))
+}
+
 impl FromStr for CheckBudget {
     type Err = String;
 
@@ -62,16 +76,19 @@ impl FromStr for CheckBudget {
             if let Some(bytes) = number(part, &BYTES).filter(|_| budget.memory.is_none()) {
                 budget.memory = Some(bytes);
             } else if let Some(most) = number(part, &TIMES).filter(|_| transitions.is_none()) {
-                let most = usize::try_from(most).ok().filter(|n| (1..=limits::CHECK_TRANSITIONS_MOST).contains(n));
-                let told = || format!("`{part}`: between 1 and {} transitions", limits::CHECK_TRANSITIONS_MOST);
-                transitions = Some(most.ok_or_else(told)?);
+                transitions = Some(followed(part, most, "transitions")?);
+            } else if let Some(most) = states(part).filter(|_| budget.states.is_none()) {
+                budget.states = Some(followed(part, most, "states")?);
             } else {
                 return Err(format!(
-                    "`{part}`: a number of transitions (`2000000`, `2M`), memory (`2GB`), or `2M,2GB`"
+                    "`{part}`: a number of transitions (`2000000`, `2M`), states (`500Kstates`), memory (`2GB`), or several, \
+                     each once: `2M,2GB`"
                 ));
             }
         }
-        budget.transitions = transitions.unwrap_or(budget.transitions);
+        // Who counts states counts no transitions, unless both are said.
+        let others = budget.states.map_or(budget.transitions, |_| limits::CHECK_TRANSITIONS_MOST);
+        budget.transitions = transitions.unwrap_or(others);
         Ok(budget)
     }
 }
@@ -83,19 +100,43 @@ fn memory(bytes: u64) -> String {
     format!("{}{unit}", bytes / times)
 }
 
-/// As it is read: `600000`, `600000,2GB`.
+/// As it is read: `600000`, `600000,2GB`, `500000states`.
 impl std::fmt::Display for CheckBudget {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{}", self.transitions)?;
-        self.memory.map_or(Ok(()), |bytes| write!(f, ",{}", memory(bytes)))
+        let transitions = self.bounds_transitions().then(|| self.transitions.to_string());
+        let states = self.states.map(|states| format!("{states}states"));
+        let parts: Vec<String> = transitions.into_iter().chain(states).chain(self.memory.map(memory)).collect();
+        f.write_str(&parts.join(","))
     }
 }
 
 impl CheckBudget {
+    /// Whether it bounds transitions, and not states alone.
+    fn bounds_transitions(self) -> bool {
+        self.states.is_none() || self.transitions < limits::CHECK_TRANSITIONS_MOST
+    }
+
     /// In words.
     pub fn told(self) -> String {
-        let memory = self.memory.map(|bytes| format!(" and {} of memory", memory(bytes)));
-        format!("{}{}", count(self.transitions, "transition"), memory.unwrap_or_default())
+        let transitions = self.bounds_transitions().then(|| count(self.transitions, "transition"));
+        transitions.into_iter().chain(self.beside()).collect::<Vec<_>>().join(" and ")
+    }
+
+    /// What it bounds beside transitions, if anything, in words.
+    fn beside(self) -> Option<String> {
+        let memory = self.memory.map(|bytes| format!("{} of memory", memory(bytes)));
+        let beside: Vec<String> = self.states.map(|states| count(states, "state")).into_iter().chain(memory).collect();
+        (!beside.is_empty()).then(|| beside.join(" and "))
+    }
+
+    /// How far it is, for the line that tells it: states of all that are followed, and transitions of those followed now.
+    fn so_far(self, states: usize, transitions: usize) -> String {
+        let transitions = match self.bounds_transitions() {
+            true => format!("{transitions} of {}", count(self.transitions, "transition")),
+            false => count(transitions, "transition"),
+        };
+        let most = self.beside().map(|beside| format!(", at most {beside}"));
+        format!("{}, {transitions}{}", count(states, "state"), most.unwrap_or_default())
     }
 }
 
@@ -150,7 +191,7 @@ impl Following {
             return Err(CommandFailure::usage(
                 CLI_MEMORY_UNKNOWN,
                 "the system does not tell how much memory this process takes up",
-                "give `--budget` a number of transitions",
+                "give `--budget` a number of transitions or states",
             ));
         }
         let interrupted = Arc::new(AtomicBool::new(false));
@@ -199,10 +240,8 @@ impl Following {
             #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
             let rate = (states as f64 / spent.as_secs_f64()) as u64;
             self.bar.set_message(format!(
-                "following: {}, {} of {}; {rate} states/s; Ctrl-C tells what was found so far",
-                count(states, "state"),
-                count(far.transitions, "transition"),
-                self.budget.told(),
+                "following: {}; {rate} states/s; Ctrl-C tells what was found so far",
+                self.budget.so_far(states, far.transitions)
             ));
             self.bar.tick();
         }
@@ -235,25 +274,64 @@ mod tests {
     }
 
     #[test]
+    fn a_budget_is_told_in_words() {
+        for (text, told, so_far) in [
+            ("2M", "2000000 transitions", "8 states, 9 of 2000000 transitions"),
+            ("7,1GB", "7 transitions and 1GB of memory", "8 states, 9 of 7 transitions, at most 1GB of memory"),
+            ("5Kstates", "5000 states", "8 states, 9 transitions, at most 5000 states"),
+            (
+                "7,5states,1KB",
+                "7 transitions and 5 states and 1KB of memory",
+                "8 states, 9 of 7 transitions, at most 5 states and 1KB of memory",
+            ),
+        ] {
+            let budget = text.parse::<CheckBudget>().unwrap();
+            assert_eq!((budget.told().as_str(), budget.so_far(8, 9).as_str()), (told, so_far));
+        }
+    }
+
+    #[test]
     fn a_budget_is_written_as_it_is_read() {
-        for (text, transitions, memory, told) in [
-            ("2M", 2_000_000, None, "2000000"),
-            ("0.5k", 500, None, "500"),
-            ("1.25g", 1_000_000_000, None, ""),
-            ("2 GB", limits::CHECK_TRANSITIONS, Some(2_000_000_000), "600000,2GB"),
-            ("1.5GB, 7", 7, Some(1_500_000_000), "7,1500MB"),
-            ("9B", limits::CHECK_TRANSITIONS, Some(9), "600000,9B"),
+        let (usual, most) = (limits::CHECK_TRANSITIONS, limits::CHECK_TRANSITIONS_MOST);
+        for (text, transitions, states, memory, told) in [
+            ("2M", 2_000_000, None, None, "2000000"),
+            ("0.5k", 500, None, None, "500"),
+            ("1.25g", 1_000_000_000, None, None, ""),
+            ("2 GB", usual, None, Some(2_000_000_000), "600000,2GB"),
+            ("1.5GB, 7", 7, None, Some(1_500_000_000), "7,1500MB"),
+            ("9B", usual, None, Some(9), "600000,9B"),
+            ("500Kstates", most, Some(500_000), None, "500000states"),
+            ("1 state, 2M", 2_000_000, Some(1), None, "2000000,1states"),
+            ("0.5M STATES,1GB", most, Some(500_000), Some(1_000_000_000), "500000states,1GB"),
+            ("2Gstates", most, None, None, ""),
+            ("0states", most, None, None, ""),
         ] {
             match text.parse::<CheckBudget>() {
                 Ok(budget) => {
-                    assert_eq!(budget, CheckBudget { transitions, memory }, "{text}");
+                    assert_eq!(budget, CheckBudget { transitions, states, memory }, "{text}");
                     assert_eq!(budget.to_string(), told, "{text}");
                     assert_eq!(told.parse(), Ok(budget), "{text}");
                 }
                 Err(why) => assert!(told.is_empty(), "{text}: {why}"),
             }
         }
-        for none in ["", "M", ".5M", "1e3", "1.2345k", "+3", "3,4", "1GB,2GB", "99999999999999999999", "5TB", "١"] {
+        for none in [
+            "",
+            "M",
+            ".5M",
+            "1e3",
+            "1.2345k",
+            "+3",
+            "3,4",
+            "1GB,2GB",
+            "99999999999999999999",
+            "5TB",
+            "١",
+            "states",
+            "5states,6states",
+            "5sta",
+            "1GBstates",
+        ] {
             assert!(none.parse::<CheckBudget>().is_err(), "{none}");
         }
     }

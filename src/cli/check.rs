@@ -39,9 +39,9 @@ pub struct Args {
     /// Show notes whole, not a line each.
     #[arg(long)]
     notes: bool,
-    /// Follow the coordinators through at most so many transitions (`2000000`, `2M`), while the process takes up at most so
-    /// much memory (`2GB`, `500MB`), or both (`20M,4GB`). Of coordinators that have nothing to do with each other each has as
-    /// many.
+    /// Follow the coordinators through at most so many transitions (`2000000`, `2M`), so many states (`500Kstates`), while the
+    /// process takes up at most so much memory (`2GB`, `500MB`), or several of these (`20M,4GB`). With states alone there may be
+    /// any number of transitions. Of coordinators that have nothing to do with each other each has as many.
     #[arg(long, value_name = "BUDGET", default_value_t)]
     budget: CheckBudget,
     /// Show the shortest way to the N-th finding, and nothing else.
@@ -83,6 +83,7 @@ impl Run for Args {
         let following = Following::new(self.budget, self.json)?;
         let effort = Effort {
             transitions: self.budget.transitions,
+            states: self.budget.states.unwrap_or(usize::MAX),
             goes_on: &|far| following.goes_on(far),
             ..Effort::default()
         };

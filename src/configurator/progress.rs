@@ -3,6 +3,8 @@
 use super::request::{Answer, Reason, Request, Residual};
 use crate::model::words::{sent_as_shown, words};
 use crate::model::{ComponentName, ConfigId, Ident, MemberRef, Outcome, RequestId, Step};
+use crate::system::Slot;
+use crate::system::touch::slot;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -22,12 +24,11 @@ pub struct StepName {
 impl StepName {
     /// The short form of `step`.
     pub fn of(step: &Step) -> Self {
-        let (member, from) = match step {
-            Step::State { .. } | Step::Create { .. } | Step::Destroy { .. } => (None, None),
-            Step::Connect { from, to, .. } | Step::Disconnect { from, to } => (Some(to.member), Some(*from)),
-            Step::PropertySet { property, .. } => (Some(property.member), None),
-            Step::PortWrite { port, .. } => (Some(port.member), None),
-            Step::Operation(call) => (Some(call.operation.member), None),
+        let (member, from) = match slot(step) {
+            Slot::Property(member) | Slot::Port(member) | Slot::Operation(member) => (Some(member.member), None),
+            Slot::Link(from, to) => (Some(to.member), Some(from)),
+            // Of the last two no step is: they are touched beside what it is about.
+            Slot::Component(_) | Slot::State(_) | Slot::Drive(_) | Slot::Held(..) => (None, None),
         };
         Self { verb: step.verb(), component: step.component(), member, from }
     }

@@ -2,12 +2,13 @@
 
 use super::tree::Cx;
 use crate::model::condition_walk::Looked;
+use crate::model::configuration::NameInChange;
 use crate::model::finding::{did_you_mean, nearest};
 use crate::model::monitor::Condition;
 use crate::model::within::Within;
 use crate::model::{
-    ChangeKind, ComponentName, Configuration, Deployment, Finding, Ident, MemberClass, MemberRef, OperatorMay, Origin,
-    Subsystem, Target, codes,
+    ComponentName, Configuration, Deployment, Finding, Ident, MemberClass, MemberRef, OperatorMay, Origin, Subsystem,
+    Target, codes,
 };
 use std::sync::Arc;
 
@@ -152,24 +153,11 @@ impl Resolve<'_> {
         let before = cx.findings.len();
         for change in &mut of.changes {
             let at = change.origin;
-            match &mut change.kind {
-                ChangeKind::Create { component, .. }
-                | ChangeKind::Destroy { component }
-                | ChangeKind::Replace { component, .. } => self.not_own(cx, *component, at),
-                ChangeKind::Connect { from, to, .. } | ChangeKind::Disconnect { from, to } => {
-                    *from = self.member(cx, *from, MemberClass::Port, at, "");
-                    *to = self.member(cx, *to, MemberClass::Port, at, "");
-                }
-                ChangeKind::PropertySet { property, .. } => {
-                    *property = self.member(cx, *property, MemberClass::Property, at, "");
-                }
-                ChangeKind::PortWrite { port, .. } => *port = self.member(cx, *port, MemberClass::Port, at, ""),
-                ChangeKind::OperationCall { call, undo } => {
-                    for call in std::iter::once(call).chain(undo) {
-                        call.operation = self.member(cx, call.operation, MemberClass::Operation, at, "");
-                    }
-                }
-            }
+            change.kind.for_each_name_mut(&mut |name| match name {
+                NameInChange::Component(component) => self.not_own(cx, *component, at),
+                NameInChange::Member(member, class) => *member = self.member(cx, *member, class, at, ""),
+                NameInChange::Type(_) | NameInChange::Activity(_) => {}
+            });
         }
         for entry in of.pre.iter().chain(of.post.iter()) {
             if let Target::Component(component) = entry.target {

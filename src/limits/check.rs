@@ -12,7 +12,7 @@ pub const CHECK_BELIEVED: usize = 300_000;
 /// made of them. One with more may tell anything in any order.
 pub const CHECK_PLACES: usize = 100_000;
 
-/// The largest number of transitions that `--budget` takes.
+/// The largest number of transitions that `--budget` takes, and of states.
 pub const CHECK_TRANSITIONS_MOST: usize = 1_000_000_000;
 
 /// States after which `check` tells how far it is, and asks whether to go on: some milliseconds.

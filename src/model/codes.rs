@@ -785,7 +785,8 @@ codes! {
          one; each line is a set of events, `run`, or `advance SECONDS`.";
     CLI_MEMORY_UNKNOWN = "cli::memory_unknown", "it is not known how much memory is taken up",
         "`davit check --budget 2GB` bounds the memory of the process, and asks the operating system how much that is \
-         (`/proc/self/status`). Here it does not tell. Bound the number of transitions instead (`--budget 2M`).";
+         (`/proc/self/status`). Here it does not tell. Bound the number of transitions (`--budget 2M`) or \
+         of states (`--budget 500Kstates`) instead.";
     CLI_WHICH_COORDINATOR = "cli::which_coordinator", "it is not said which coordinator is meant",
         "The deployment has several coordinators (`coordinators:`), and the command works on one. Give its name with `--of NAME`.";
     CLI_UNKNOWN_SUBSYSTEM = "cli::unknown_subsystem", "there is no subsystem of that path",

@@ -1,5 +1,6 @@
 //! Configurations: what is to be changed, as written (semantics: *Configurations*).
 
+use super::component_type::MemberClass;
 use super::finding::Origin;
 use super::monitor::Condition;
 use super::names::{ComponentName, ConfigId, EventName, Ident, MemberRef, TypeName};
@@ -170,6 +171,19 @@ pub enum ChangeKind {
     },
 }
 
+/// A name that a change is written with: whoever walks through them needs to know no change.
+#[derive(Debug)]
+pub enum NameInChange<'a> {
+    /// A component.
+    Component(&'a mut ComponentName),
+    /// The type of a component.
+    Type(&'a mut TypeName),
+    /// An activity.
+    Activity(&'a mut Ident),
+    /// A member of a component, and what it has to be.
+    Member(&'a mut MemberRef, MemberClass),
+}
+
 /// A call of an operation.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Call {
@@ -231,6 +245,32 @@ impl ChangeKind {
             }
         };
         std::iter::once(one).chain(other.filter(|other| *other != one)).collect()
+    }
+}
+
+impl ChangeKind {
+    /// Calls `f` with every name in it, in the order written: to put another in its place. Names of what a component's type has
+    /// (its properties, the ports of a map) mean the same wherever it is.
+    pub fn for_each_name_mut(&mut self, f: &mut impl FnMut(NameInChange<'_>)) {
+        use MemberClass::{Operation, Port, Property};
+        use NameInChange as N;
+        match self {
+            Self::Create { component, ty, activity, .. } | Self::Replace { component, ty, activity, .. } => {
+                f(N::Component(component));
+                f(N::Type(ty));
+                activity.iter_mut().for_each(|activity| f(N::Activity(activity)));
+            }
+            Self::Destroy { component } => f(N::Component(component)),
+            Self::Connect { from, to, .. } | Self::Disconnect { from, to } => {
+                f(N::Member(from, Port));
+                f(N::Member(to, Port));
+            }
+            Self::PropertySet { property, .. } => f(N::Member(property, Property)),
+            Self::PortWrite { port, .. } => f(N::Member(port, Port)),
+            Self::OperationCall { call, undo } => {
+                std::iter::once(call).chain(undo).for_each(|call| f(N::Member(&mut call.operation, Operation)));
+            }
+        }
     }
 }
 

@@ -1,7 +1,7 @@
 //! What is written in the file of a subsystem, as it is called from outside: every name with the path before it.
 
 use super::condition_walk::Looked;
-use super::configuration::{Call, Change, ChangeKind, Configuration};
+use super::configuration::{Change, ChangeKind, Configuration, NameInChange};
 use super::deployment::{Coordinator, CoordinatorNaming, OperatorMay, SimulatedReaction, StepFault};
 use super::event::{Ask, UNDO, Verdict};
 use super::monitor::{Condition, Monitor, is_monitors};
@@ -58,33 +58,15 @@ impl Within<'_> {
         StateList::of(list.iter().map(entry)).unwrap_or_default()
     }
 
-    fn call(&self, call: &Call) -> Call {
-        Call { operation: self.member(call.operation), args: call.args.clone() }
-    }
-
     fn kind(&self, kind: &ChangeKind) -> ChangeKind {
-        use ChangeKind as K;
-        let activity = |activity: &Option<Ident>| activity.map(|activity| self.activity(activity));
-        match kind.clone() {
-            K::Create { component, ty, activity: of, properties } => {
-                K::Create { component: self.component(component), ty: self.ty(ty), activity: activity(&of), properties }
-            }
-            K::Destroy { component } => K::Destroy { component: self.component(component) },
-            K::Connect { from, to, policy } => K::Connect { from: self.member(from), to: self.member(to), policy },
-            K::Disconnect { from, to } => K::Disconnect { from: self.member(from), to: self.member(to) },
-            K::PropertySet { property, value } => K::PropertySet { property: self.member(property), value },
-            K::PortWrite { port, value } => K::PortWrite { port: self.member(port), value },
-            K::OperationCall { call, undo } => {
-                K::OperationCall { call: self.call(&call), undo: undo.map(|undo| self.call(&undo)) }
-            }
-            K::Replace { component, ty, activity: of, properties, map } => K::Replace {
-                component: self.component(component),
-                ty: self.ty(ty),
-                activity: activity(&of),
-                properties,
-                map,
-            },
-        }
+        let mut kind = kind.clone();
+        kind.for_each_name_mut(&mut |name| match name {
+            NameInChange::Component(component) => *component = self.component(*component),
+            NameInChange::Type(ty) => *ty = self.ty(*ty),
+            NameInChange::Activity(activity) => *activity = self.activity(*activity),
+            NameInChange::Member(member, _) => *member = self.member(*member),
+        });
+        kind
     }
 
     /// A condition.

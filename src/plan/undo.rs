@@ -119,17 +119,10 @@ impl<'o, 's> Script<'o, 's> {
                 return Ok(None);
             }
         }
+        if absolute(&item.step).is_some() && is_so(&item.step, self.view) {
+            return Ok(None);
+        }
         match &item.step {
-            Step::PropertySet { property, value } => {
-                if self.view.component(component).and_then(|n| n.value(property.member)) == Some(value) {
-                    return Ok(None);
-                }
-            }
-            Step::PortWrite { port, value } => {
-                if step::written(*port, self.view) == Some(value.as_ref()) {
-                    return Ok(None);
-                }
-            }
             Step::State { transition, .. } => {
                 let state = self.view.component(component).map(|n| n.state);
                 // Cleaned up after a fault, and that taken back: a fault is never restored, so it is down here.
@@ -140,8 +133,7 @@ impl<'o, 's> Script<'o, 's> {
                     return Ok(None);
                 }
             }
-            // Connections do not depend on run states, and a failed component may be destroyed as it is.
-            Step::Connect { .. } | Step::Disconnect { .. } | Step::Create { .. } => {}
+            // A failed component may be destroyed as it is.
             Step::Destroy { .. } => {
                 let state = self.view.component(component).map(|n| n.state);
                 if matches!(state, Some(RunState::Faulted | RunState::Unconfigured)) {
@@ -150,11 +142,12 @@ impl<'o, 's> Script<'o, 's> {
                     self.settle(component, wave)?;
                 }
             }
-            Step::Operation(_) => {}
-        }
-        if matches!(item.step, Step::PropertySet { .. } | Step::Operation(_)) {
-            self.settle(component, wave)?;
-            self.clear_fault(&item, wave)?;
+            // These depend on run states; connections, and what is written to ports, do not.
+            Step::PropertySet { .. } | Step::Operation(_) => {
+                self.settle(component, wave)?;
+                self.clear_fault(&item, wave)?;
+            }
+            _ => {}
         }
         self.push(item, wave, after).map(Some)
     }

@@ -23,7 +23,7 @@ pub use node::{ComponentNode, Driven, Link, Written};
 pub use overlay::Overlay;
 pub use picture::Picture;
 pub use place::SlotHandle;
-pub use so::is_so;
+pub use so::{is_seen_so, is_so};
 pub use step::{Reversibility, Undo};
 pub use system_graph::{System, UnknownType};
 pub use touch::{Access, Slot, Touch};

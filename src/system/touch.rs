@@ -194,11 +194,7 @@ fn absolute_write(slot: Slot, needs: Option<Slot>, each: &mut impl FnMut(Touch))
 
 /// The slot of an absolute write.
 pub fn absolute(step: &Step) -> Option<Slot> {
-    match step {
-        Step::PropertySet { property, .. } => Some(Slot::Property(*property)),
-        Step::PortWrite { port, .. } => Some(Slot::Port(*port)),
-        _ => None,
-    }
+    Some(slot(step)).filter(|slot| slot.is_absolute())
 }
 
 /// The components that `step` is done to, each once: of a connection both ends.

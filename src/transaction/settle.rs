@@ -5,7 +5,7 @@ use super::run::StepsRun;
 use super::{OpenQuestion, Transaction, TransactionPhase};
 use crate::model::{ComponentName, Effect, RunState, Snapshot, Step};
 use crate::system::touch::components;
-use crate::system::{System, View as _};
+use crate::system::{System, View as _, is_seen_so};
 
 /// Whether a step happened.
 enum SettledAs {
@@ -155,26 +155,16 @@ impl StepsRun {
     fn judge(&mut self, i: u32, seen: &Snapshot, live: &mut System) -> SettledAs {
         let step = self.list[i as usize].step.clone();
         let component = step.component();
-        let one = seen.components.get(&component);
-        let is = match &step {
-            Step::State { transition, .. } => match one {
-                Some(seen) if seen.state == transition.target() => Some(true),
-                Some(seen) if seen.state == RunState::Faulted => {
+        let is = match (is_seen_so(&step, seen), &step) {
+            // Not where it leads to: it did not happen only where the component has failed, or is where it was.
+            (Some(false), Step::State { .. }) => match seen.components[&component].state {
+                RunState::Faulted => {
                     self.made_faulted(component, live);
                     Some(false)
                 }
-                Some(seen) => (live.component(component).map(|node| node.state) == Some(seen.state)).then_some(false),
-                None => None,
+                state => (live.component(component).map(|node| node.state) == Some(state)).then_some(false),
             },
-            Step::Create { ty, .. } => Some(one.is_some_and(|seen| seen.ty == *ty)),
-            Step::Destroy { .. } => Some(one.is_none()),
-            Step::PropertySet { property, value } => {
-                one.and_then(|seen| seen.properties.get(&property.member).map(|now| now == value))
-            }
-            Step::Connect { from, to, policy } => Some(seen.connections.get(&(*from, *to)) == Some(policy)),
-            Step::Disconnect { from, to } => Some(!seen.connections.contains_key(&(*from, *to))),
-            Step::PortWrite { port, value } => Some(seen.ports.get(port) == value.as_ref()),
-            Step::Operation(_) => None,
+            (is, _) => is,
         };
         match is {
             Some(true) => SettledAs::Happened,

@@ -1,5 +1,5 @@
-//! The table of what can be written against reading: every row's example is read and its refused line refused, in both languages;
-//! the schema says what reading says; the pages of the reference are made of it.
+//! The table of what can be written against reading: every row's example is read, in both languages, and its refused line refused
+//! (in Lua: `in_lua`); the schema says what reading says; the pages of the reference are made of it.
 
 use davit::diagnostics::render;
 use davit::lang::grammar::{CHANGES, FILES, File, Form, Key, Languages, Object};
@@ -37,12 +37,12 @@ const COORDINATOR: &str = "return state { idle = state {}, trans { src = \"initi
 /// One that uses the parameter of the example of `with`.
 const WITH_GAIN: &str = "ConfiguratorConf { up = Configuration { property_set(\"A.k\", gain) } }";
 
-fn yaml(line: &str) -> Value {
+pub fn yaml(line: &str) -> Value {
     serde_yaml::from_str(line).unwrap_or_else(|why| panic!("{line}: {why}"))
 }
 
 /// Puts the keys of `line` (`key: value`) into a table.
-fn put(table: &mut Mapping, line: &str) {
+pub fn put(table: &mut Mapping, line: &str) {
     if line.is_empty() {
         return;
     }
@@ -51,7 +51,7 @@ fn put(table: &mut Mapping, line: &str) {
 }
 
 /// A table with what it must have.
-fn least(object: &Object) -> Mapping {
+pub fn least(object: &Object) -> Mapping {
     let mut table = Mapping::new();
     object.yaml_keys().filter(|key| key.required).for_each(|key| put(&mut table, &key.yaml()));
     if object.name == "deployment" {
@@ -88,7 +88,7 @@ fn within(form: &Form, object: &Object, value: Value) -> Option<Value> {
 }
 
 /// A whole file in which the table stands.
-fn around(file: &File, object: &Object, table: Mapping) -> Value {
+pub fn around(file: &File, object: &Object, table: Mapping) -> Value {
     let mut value = Value::Mapping(table);
     let mut inner = object;
     while !std::ptr::eq(inner, file.object) {
@@ -112,7 +112,7 @@ fn holds(outer: &'static Object, inner: &Object) -> Option<&'static Key> {
 }
 
 /// Loads a file of that kind, in a deployment.
-fn load(file: &File, text: &str, name: &str) -> Loaded {
+pub fn load(file: &File, text: &str, name: &str) -> Loaded {
     let gain = (text.contains("with:") || text.contains("parameters:")) && text.contains("gain");
     let a = text.contains("parameters:\n  a:");
     let deployment = match file.name {
@@ -147,7 +147,7 @@ fn refused(loaded: &Loaded) -> bool {
         || charts().any(|chart| davit::statechart::compile(chart).0.is_none())
 }
 
-fn shown(loaded: &Loaded) -> String {
+pub fn shown(loaded: &Loaded) -> String {
     render(&loaded.findings, &loaded.sources, false)
 }
 
@@ -226,6 +226,17 @@ fn what_a_key_is_for_is_said_first() {
             let first = key.doc.split(". ").next().unwrap();
             let of_a_word = first.starts_with('`') && first.contains("`: ");
             assert!(!of_a_word && first.len() > 8, "{}.{}: {first}", object.name, key.name);
+        }
+    }
+}
+
+/// Who leaves a key out knows what holds then.
+#[test]
+fn what_holds_without_a_key_is_said() {
+    for object in FILES.iter().flat_map(File::objects) {
+        for key in object.keys.iter().filter(|key| key.language != Languages::None) {
+            let optional = !key.required && key.instead.is_empty();
+            assert_eq!(optional, !key.default.is_empty(), "{}.{}: {}", object.name, key.name, key.default);
         }
     }
 }

@@ -4,7 +4,8 @@ use super::{Form, Key, Languages, NameKind, Object, key};
 use crate::model::codes::{TEXT_BAD_NAME, TEXT_BAD_VALUE, TEXT_UNKNOWN_KEY, TEXT_WRONG_TYPE};
 
 /// What a part of a chart is for.
-const DOC: Key = key("doc", Form::Text, "What it is for.", "doc = \"waits for people\"", ("doc: 1", TEXT_WRONG_TYPE));
+const DOC: Key = key("doc", Form::Text, "What it is for.", "doc = \"waits for people\"", ("doc: 1", TEXT_WRONG_TYPE))
+    .without("none");
 
 /// A coordinator's file in YAML.
 pub static COORDINATOR_FILE: Object = Object {
@@ -12,7 +13,7 @@ pub static COORDINATOR_FILE: Object = Object {
     what: "a coordinator's file",
     doc: "A statechart that performs nothing itself. In Lua the file returns its outermost state (`return state { … }`), in YAML \
           that stands under the one key. SCXML is read too.",
-    example: "coordinator: …",
+    example: "coordinator: { states: { idle: {} }, transitions: [{ src: initial, tgt: idle }] }",
     keys: &[key(
         "coordinator",
         Form::Table(&STATE),
@@ -39,7 +40,7 @@ pub static STATE: Object = Object {
             "The states in it.",
             "states: { idle: {}, busy: {} }",
             ("states: [idle, busy]", TEXT_WRONG_TYPE),
-        )
+        ).without("it has none in it")
         .only(Languages::Yaml),
         key(
             "transitions",
@@ -47,7 +48,7 @@ pub static STATE: Object = Object {
             "Transitions between them. The source `initial` says which one is entered first.",
             "transitions: [{ src: initial, tgt: idle }]",
             ("transitions: { src: initial, tgt: idle }", TEXT_WRONG_TYPE),
-        )
+        ).without("none")
         .only(Languages::Yaml),
         key(
             "config",
@@ -55,28 +56,28 @@ pub static STATE: Object = Object {
             "Configurations that are in force while it is active: entering it asks for them, leaving it takes them back.",
             "config = \"enable_copying\"",
             ("config: \"enable copying\"", TEXT_BAD_NAME),
-        ),
+        ).without("none is asked for"),
         key(
             "entry",
             Form::Several(&Form::Name(NameKind::Event)),
             "Names that are raised when it is entered: of configurations (`ID`, `ID.undo`, `undo`), which asks for them, or of events.",
             "entry = \"e_ready\"",
             ("entry: \"e ready\"", TEXT_BAD_NAME),
-        ),
+        ).without("nothing is raised"),
         key(
             "exit",
             Form::Several(&Form::Name(NameKind::Event)),
             "Names that are raised when it is left.",
             "exit = \"e_ready\"",
             ("exit: 1", TEXT_WRONG_TYPE),
-        ),
+        ).without("nothing is raised"),
         key(
             "doo",
             Form::Function,
             "What is done while it is active; only a trusted coordinator has one.",
             "doo = function() end",
-            ("doo: e_work", TEXT_WRONG_TYPE),
-        )
+            ("doo = \"e_work\"", TEXT_WRONG_TYPE),
+        ).without("nothing is done")
         .only(Languages::Lua),
         DOC,
     ],
@@ -136,8 +137,8 @@ pub static TRANSITION: Object = Object {
             Form::Function,
             "Must not say no; only a trusted coordinator has one.",
             "guard = function() return true end",
-            ("guard: e_ready", TEXT_WRONG_TYPE),
-        )
+            ("guard = \"e_ready\"", TEXT_WRONG_TYPE),
+        ).without("an event of the transition is enough")
         .only(Languages::Lua),
         key(
             "effect",
@@ -145,7 +146,7 @@ pub static TRANSITION: Object = Object {
             "Names that are raised when it is taken, after what is left and before what is entered.",
             "effect = \"e_ready\"",
             ("effect: \"e ready\"", TEXT_BAD_NAME),
-        ),
+        ).without("nothing is raised"),
         key(
             "pn",
             Form::Number,

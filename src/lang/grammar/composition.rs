@@ -27,10 +27,13 @@ pub static PARAMETER: Object = Object {
             "The least number: of each element, and of each number in a record; says nothing of texts.",
             "min: 0.0",
             ("min: .inf", TEXT_NOT_FINITE),
-        ),
-        key("max", Form::Number, "The greatest, likewise.", "max: 10.0", ("max: ten", TEXT_WRONG_TYPE)),
-        key("unit", Form::Text, "Its unit, for whoever reads it.", "unit: s", ("unit: 1", TEXT_WRONG_TYPE)),
-        key("doc", Form::Text, "What it is for.", "doc: one way", ("doc: 1", TEXT_WRONG_TYPE)),
+        )
+        .without("any is allowed"),
+        key("max", Form::Number, "The greatest, likewise.", "max: 10.0", ("max: ten", TEXT_WRONG_TYPE))
+            .without("any is allowed"),
+        key("unit", Form::Text, "Its unit, for whoever reads it.", "unit: s", ("unit: 1", TEXT_WRONG_TYPE))
+            .without("none"),
+        key("doc", Form::Text, "What it is for.", "doc: one way", ("doc: 1", TEXT_WRONG_TYPE)).without("none"),
     ],
     ..Object::BARE
 };
@@ -52,21 +55,24 @@ pub static EXPORTS: Object = Object {
             "Ports, to be connected or written. An in-port is one that nothing inside drives.",
             "ports: { level: A.x }",
             ("ports: [A.x]", TEXT_WRONG_TYPE),
-        ),
+        )
+        .without("none"),
         key(
             "properties",
             MEMBERS,
             "Properties, to be set.",
             "properties: { gain: A.k }",
             ("properties: { gain: k }", TEXT_BAD_NAME),
-        ),
+        )
+        .without("none"),
         key(
             "operations",
             MEMBERS,
             "Operations, to be called.",
             "operations: { reset: A.reset }",
             ("operations: A.reset", TEXT_WRONG_TYPE),
-        ),
+        )
+        .without("none"),
         key(
             "from",
             Form::Name(NameKind::Event),
@@ -127,14 +133,14 @@ pub static SUBSYSTEM: Object = Object {
             "Values of its parameters.",
             "parameters: { delay_s: 0.02 }",
             ("parameters: 0.02", TEXT_WRONG_TYPE),
-        ),
+        ).without("their defaults"),
         key(
             "activities",
             Form::Named(&Form::Name(NameKind::Plain)),
             "Activities of it that are those of this file: its name for one, and the name here. All others are its own.",
             "activities: { control: control }",
             ("activities: [control]", TEXT_WRONG_TYPE),
-        ),
+        ).without("all are its own"),
     ],
     ..Object::BARE
 };

@@ -11,7 +11,7 @@ pub static CONFIGURATIONS_FILE: Object = Object {
     name: "configurations_file",
     what: "a file of configurations",
     doc: "Configurations by name. In Lua: `ConfiguratorConf { name = Configuration { … } }`, as in the paper's listings.",
-    example: "configurations: …",
+    example: "configurations: { engage: { changes: [{ property_set: { property: A.k, value: 1.0 } }] } }",
     keys: &[key(
         "configurations",
         Form::Named(&Form::Table(&CONFIGURATION)),
@@ -39,7 +39,7 @@ pub static CONFIGURATION: Object = Object {
              microblx and the paper are read too). `_default:STATE` stands for every component that the list does not name.",
             "pre_conf_state = { 'youbot:running', '_default:stopped' }",
             ("pre_conf_state: [\"youbot:runing\"]", CONF_BAD_STATE),
-        ),
+        ).without("none is asked for first"),
         key(
             "changes",
             Form::Changes,
@@ -47,14 +47,14 @@ pub static CONFIGURATION: Object = Object {
              worked out.",
             "changes: [{ property_set: { property: Dynamics.force_gain, value: [0.1, 0.1, 0.1] } }]",
             ("changes: [{ property_sett: {} }]", CONF_UNKNOWN_CHANGE),
-        ),
+        ).without("nothing but run states is changed"),
         key(
             "post_conf_state",
             Form::States,
             "Run states to bring components to last, in this order; written like `pre_conf_state`.",
             "post_conf_state = { '_default:running' }",
             ("post_conf_state: [\"youbot\"]", CONF_BAD_STATE),
-        ),
+        ).without("none is asked for last"),
         key(
             "timeout",
             Form::Seconds,
@@ -69,7 +69,7 @@ pub static CONFIGURATION: Object = Object {
             "Alternatives have the same one: applying one of them replaces the frame of the one in force.",
             "group = \"dof\"",
             ("group: \"d of\"", TEXT_BAD_NAME),
-        ),
+        ).without("it has no alternatives"),
         key(
             "safe",
             Form::Truth,
@@ -95,14 +95,14 @@ pub static CONFIGURATION: Object = Object {
              the coordinator hears `ID.lost`.",
             "holds = in_state(\"Driver\", \"running\")",
             ("holds: { runs: [Driver] }", MONITOR_UNKNOWN_WORD),
-        ),
+        ).without("nothing is watched but what its steps did"),
         key(
             "confirm",
             Form::Table(&CONFIRM),
             "An event that must come, else it is undone again (`ID.reverted`). Refused beside `safe` and `on_failure: hold`.",
             "confirm = { event = \"e_aligned\", within = 2.0 }",
             ("confirm: e_aligned", TEXT_WRONG_TYPE),
-        ),
+        ).without("it stays"),
         key(
             "irreversible",
             Form::Truth,
@@ -117,7 +117,7 @@ pub static CONFIGURATION: Object = Object {
             "What it is for.",
             "description = \"what it is for\"",
             ("description: 1", TEXT_WRONG_TYPE),
-        ),
+        ).without("none"),
     ],
     ..Object::BARE
 };

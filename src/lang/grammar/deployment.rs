@@ -57,14 +57,14 @@ pub static DEPLOYMENT: Object = Object {
              difference.",
             "types: { Gain: { properties: { k: { type: float, default: 1.0 } } } }",
             ("types: [Gain]", TEXT_WRONG_TYPE),
-        ),
+        ).without("there are those of `libraries`"),
         key(
             "activities",
             Form::Named(&Form::Table(&ACTIVITY)),
             "Threads in which components are updated; `create` names the one of its component.",
             "activities: { control: { period_ms: 1.0, priority: 80 } }",
             ("activities: [control]", TEXT_WRONG_TYPE),
-        ),
+        ).without("there is the activity `default`, with a period of 10 ms"),
         key(
             "configurations",
             FILES,
@@ -87,14 +87,14 @@ pub static DEPLOYMENT: Object = Object {
             "Several coordinators that run side by side, each under its name.",
             "coordinators: { arm: arm.lua, gripper: gripper.lua }",
             ("coordinators: [arm.lua]", TEXT_WRONG_TYPE),
-        ),
+        ).without("there is the one of `coordinator`"),
         key(
             "monitors",
             FILES,
             "Files of monitors, Lua or YAML.",
             "monitors: [monitors.lua]",
             ("monitors: 1", TEXT_WRONG_TYPE),
-        ),
+        ).without("nothing is monitored"),
         key(
             "trusted",
             Form::Either(&[Form::Truth, Form::Table(&TRUSTED)]),
@@ -109,7 +109,7 @@ pub static DEPLOYMENT: Object = Object {
             "Files of Lua that stand in for what the functions of trusted coordinators expect around them; refused without `trusted`.",
             "host: [robot.lua]",
             ("host: 1", TEXT_WRONG_TYPE),
-        )
+        ).without("none")
         .beside("trusted: true"),
         key(
             "with",
@@ -117,21 +117,21 @@ pub static DEPLOYMENT: Object = Object {
             "Parameters of the Lua files, where each is a global of that name; `--set gain=0.7` overrides it, and one of these that no file reads is refused (here that is a warning).",
             "with: { gain: 0.5 }",
             ("with: 0.5", TEXT_WRONG_TYPE),
-        ),
+        ).without("there is none"),
         key(
             "emits",
             EVENTS,
             "Events of the coordinators that leave the deployment, though nobody in it waits for them.",
             "emits: [e_ready]",
             ("emits: [\"e ready\"]", TEXT_BAD_NAME),
-        ),
+        ).without("none leaves it"),
         key(
             "accepts",
             EVENTS,
             "Events that it takes of the deployment that it is a subsystem of. Those that begin and end it are among them.",
             "accepts: [e_grasp]",
             ("accepts: [\"e grasp\"]", TEXT_BAD_NAME),
-        ),
+        ).without("those two alone"),
         key(
     "parameters",
     Form::Named(&Form::Table(&PARAMETER)),
@@ -139,7 +139,7 @@ pub static DEPLOYMENT: Object = Object {
      One without a default must be given, and one that no file reads is told.",
     "parameters: { gain: { type: float, default: 0.5, min: 0.0 } }",
     ("parameters: { gain: 0.5 }", TEXT_WRONG_TYPE),
-),
+).without("nothing"),
         key(
     "exports",
     Form::Table(&EXPORTS),
@@ -147,14 +147,14 @@ pub static DEPLOYMENT: Object = Object {
      component: `connect(\"left.tool_pose\", \"right.ext_ref\")`.",
     "exports: { ports: { level: A.x } }",
     ("exports: [A.x]", TEXT_WRONG_TYPE),
-),
+).without("nothing"),
         key(
     "leaving",
     Form::Table(&LEAVING),
     "How a subsystem is let go before it takes away what it exports.",
     "leaving: { says: e_leaving, until: e_released }",
     ("leaving: e_leaving", TEXT_WRONG_TYPE),
-)
+).without("it takes that away unasked")
 .beside("accepts: [e_released]\nemits: [e_leaving]"),
         key(
     "subsystems",
@@ -163,7 +163,7 @@ pub static DEPLOYMENT: Object = Object {
      name before them: `left/Dynamics`, `left/e_start`.",
     "subsystems: { left: { deployment: robot.yaml } }",
     ("subsystems: [robot.yaml]", TEXT_WRONG_TYPE),
-),
+).without("none"),
         key(
             "safety",
             EVENTS,
@@ -171,7 +171,7 @@ pub static DEPLOYMENT: Object = Object {
              all others, and are heard while the deployment is being stopped.",
             "safety: [e_estop]",
             ("safety: [e_estop, e_estop]", TEXT_DUPLICATE_KEY),
-        ),
+        ).without("none"),
         key(
             "operator",
             Form::Several(&Form::Either(&[Form::Name(NameKind::Configuration), Form::Name(NameKind::Member)])),
@@ -179,7 +179,7 @@ pub static DEPLOYMENT: Object = Object {
              (`Component.member`). `davit check` follows them wherever they may come.",
             "operator: [profile_soft, Cart_Impedance.stiffness]",
             ("operator: [profile_soft, profile_soft]", TEXT_DUPLICATE_KEY),
-        ),
+        ).without("nothing"),
         key(
             "deploy",
             Form::Table(&DEPLOY),
@@ -202,7 +202,7 @@ pub static DEPLOYMENT: Object = Object {
             "Bounds of this deployment.",
             "limits: { stack: 64, step_timeout_s: 1.0 }",
             ("limits: 64", TEXT_WRONG_TYPE),
-        ),
+        ).without("those of its keys"),
         key("durability", Form::Text, "", "", ("durability: full", DEPLOY_NO_JOURNAL)).only(Languages::None),
         key(
             "simulated",
@@ -210,14 +210,14 @@ pub static DEPLOYMENT: Object = Object {
             "What components do by themselves on the simulated platform, so that a coordinator meets the events that it waits for.",
             "simulated: { reactions: [{ after: start radio, delay_s: 0.5, raise: e_qos_ok, component: radio }] }",
             ("simulated: [e_qos_ok]", TEXT_WRONG_TYPE),
-        ),
+        ).without("they raise nothing"),
         key(
             "faults",
             Form::List(&Form::Table(&FAULT)),
             "What goes wrong on the simulated platform.",
             "faults: [{ step: \"property_set a.k\", how: fail }]",
             ("faults: { step: \"start a\", how: fail }", TEXT_WRONG_TYPE),
-        ),
+        ).without("nothing"),
     ],
     ..Object::BARE
 };
@@ -234,7 +234,8 @@ pub static TRUSTED: Object = Object {
         "Libraries of Lua that are closed otherwise.",
         "open: [io, os]",
         ("open: [net]", TEXT_BAD_VALUE),
-    )],
+    )
+    .without("none of them is open")],
     ..Object::BARE
 };
 
@@ -303,7 +304,8 @@ pub static DEPLOY: Object = Object {
             "States that mean that it failed: it is led down then.",
             "failed: [fault]",
             ("failed: [1]", TEXT_WRONG_TYPE),
-        ),
+        )
+        .without("it fails only when it takes too long"),
         key(
             "within_s",
             Form::Seconds,
@@ -353,7 +355,7 @@ pub static SHUTDOWN: Object = Object {
             "Configurations that bring the hardware to rest, in this order, where it is taken down without its coordinators.",
             "rest: [park]",
             ("rest: [\"p ark\"]", TEXT_BAD_NAME),
-        ),
+        ).without("only those that are `safe`"),
     ],
     ..Object::BARE
 };
@@ -399,7 +401,8 @@ pub static SIMULATED: Object = Object {
         "What is raised after which step.",
         "reactions: [{ after: start radio, raise: e_qos_ok, component: radio }]",
         ("reactions: e_qos_ok", TEXT_WRONG_TYPE),
-    )],
+    )
+    .without("nothing")],
     ..Object::BARE
 };
 
@@ -466,7 +469,7 @@ pub static FAULT: Object = Object {
             ("times: 0", TEXT_BAD_VALUE),
         )
         .without("1"),
-        key("takes_s", Form::Seconds, "How long a step takes that is `slow`: required there, and refused of any other.", "takes_s: 0.5", ("takes_s: 0", TEXT_BAD_TIME))
+        key("takes_s", Form::Seconds, "How long a step takes that is `slow`: required there, and refused of any other.", "takes_s: 0.5", ("takes_s: 0", TEXT_BAD_TIME)).without("it takes no time")
             .beside("how: slow"),
     ],
     ..Object::BARE

@@ -68,7 +68,7 @@ pub struct Key {
     pub doc: &'static str,
     /// A line with it, as Lua has it where it can be written in Lua.
     pub example: &'static str,
-    /// A line of YAML with it that is refused.
+    /// A line with it that is refused: of YAML, or of Lua where only that can have it.
     pub refused: &'static str,
     /// With this code.
     pub code: Code,

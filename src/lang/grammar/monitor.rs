@@ -10,7 +10,7 @@ pub static MONITORS_FILE: Object = Object {
     name: "monitors_file",
     what: "a file of monitors",
     doc: "Monitors by name. In Lua: `Monitors { name = monitor { … } }`.",
-    example: "monitors: …",
+    example: "monitors: { high: { when: { above: [A.x, 2.0] }, event: e_high } }",
     keys: &[key(
         "monitors",
         Form::Named(&Form::Table(&MONITOR)),
@@ -85,7 +85,8 @@ pub static MONITOR: Object = Object {
             "What it is for.",
             "description = \"what it is for\"",
             ("description: 1", TEXT_WRONG_TYPE),
-        ),
+        )
+        .without("none"),
     ],
     ..Object::BARE
 };

@@ -7,7 +7,7 @@ use crate::model::codes::{
 
 /// What a part of a type does, for people.
 const fn doc(example: &'static str) -> Key {
-    key("doc", Form::Text, "What it is for.", example, ("doc: 1", TEXT_WRONG_TYPE))
+    key("doc", Form::Text, "What it is for.", example, ("doc: 1", TEXT_WRONG_TYPE)).without("none")
 }
 
 /// The unit of a port or property.
@@ -17,14 +17,15 @@ const UNIT: Key = key(
     "The unit of its number, as a text. Two ports that are connected have the same one, or one of them has none.",
     "unit: N",
     ("unit: 1", TEXT_WRONG_TYPE),
-);
+)
+.without("none");
 
 /// A component type.
 pub static TYPE: Object = Object {
     name: "type",
     what: "a component type",
     doc: "What components of a type offer, and what it means to start, stop and destroy them.",
-    example: "Gain: { ports: {...}, properties: {...} }",
+    example: "Gain: { ports: { u: { direction: in, type: float } }, properties: { k: { type: float, default: 1.0 } } }",
     may_be_empty: true,
     keys: &[
         doc("doc: multiplies its input"),
@@ -34,35 +35,35 @@ pub static TYPE: Object = Object {
             "Its ports.",
             "ports: { u: { direction: in, type: float, unit: N } }",
             ("ports: [u]", TEXT_WRONG_TYPE),
-        ),
+        ).without("none"),
         key(
             "properties",
             Form::Named(&Form::Table(&PROPERTY)),
             "Its properties.",
             "properties: { k: { type: float, default: 1.0 } }",
             ("properties: [k]", TEXT_WRONG_TYPE),
-        ),
+        ).without("none"),
         key(
             "operations",
             Form::Named(&Form::Table(&OPERATION)),
             "Its operations.",
             "operations: { reset: { effect: none } }",
             ("operations: [reset]", TEXT_WRONG_TYPE),
-        ),
+        ).without("none"),
         key(
             "start_after",
             Form::Several(&Form::Name(NameKind::Type)),
             "Where one `_default` starts both and connections go round in a circle, components of these types are started first; else the flow of data decides.",
             "start_after: [Driver]",
             ("start_after: [\"my driver\"]", TEXT_BAD_NAME),
-        ),
+        ).without("the name decides there"),
         key(
             "stop_before",
             Form::Several(&Form::Name(NameKind::Type)),
             "Likewise: where connections go round in a circle, it is stopped before components of these types.",
             "stop_before: [Driver]",
             ("stop_before: [\"my driver\"]", TEXT_BAD_NAME),
-        ),
+        ).without("the name decides there"),
         key(
             "actuator",
             Form::Truth,
@@ -78,14 +79,14 @@ pub static TYPE: Object = Object {
             "Whether starting or stopping it moves hardware: no rollback that nobody asked for does that.",
             "moves: [start]",
             ("moves: [halt]", TEXT_BAD_VALUE),
-        ),
+        ).without("neither does"),
         key(
             "irreversible",
             Form::Several(&Form::Choice(&["configure", "stop", "destroy"])),
             "Which of these nothing undoes.",
             "irreversible: [destroy]",
             ("irreversible: [start]", TEXT_BAD_VALUE),
-        ),
+        ).without("none of them"),
         key(
             "exclusive",
             Form::Several(&Form::Text),
@@ -93,7 +94,7 @@ pub static TYPE: Object = Object {
              *configured* on until it is *unconfigured* again, one component at a time, in all of a deployment: a second one is refused.",
             "exclusive: [can0]",
             ("exclusive: 1", TEXT_WRONG_TYPE),
-        ),
+        ).without("nothing"),
     ],
     ..Object::BARE
 };
@@ -158,8 +159,10 @@ pub static PROPERTY: Object = Object {
             "The least number: of each element, and of each number in a record; says nothing of texts.",
             "min: 0.0",
             ("min: .inf", crate::model::codes::TEXT_NOT_FINITE),
-        ),
-        key("max", Form::Number, "The greatest, likewise.", "max: 10.0", ("max: ten", TEXT_WRONG_TYPE)),
+        )
+        .without("any is allowed"),
+        key("max", Form::Number, "The greatest, likewise.", "max: 10.0", ("max: ten", TEXT_WRONG_TYPE))
+            .without("any is allowed"),
         key(
             "tunable",
             Form::Choice(&["unconfigured", "stopped", "always"]),

@@ -318,7 +318,7 @@ fn kind(cx: &mut Cx, verb: &'static str, mut fields: Fields) -> Option<ChangeKin
             let value = required_value(cx, &mut fields, port, "a port's value");
             port.zip(value).map(|(port, value)| ChangeKind::PortWrite { port, value })
         }
-        _ => {
+        "operation_call" => {
             let undo = fields.take(cx, "undo");
             let call = call(cx, &mut fields);
             let undo = match undo {
@@ -331,6 +331,7 @@ fn kind(cx: &mut Cx, verb: &'static str, mut fields: Fields) -> Option<ChangeKin
             };
             call.zip(undo).map(|(call, undo)| ChangeKind::OperationCall { call, undo })
         }
+        verb => unreachable!("`{verb}` has a row among the changes, and is read here"),
     };
     fields.finish(cx);
     kind

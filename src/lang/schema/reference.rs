@@ -70,7 +70,7 @@ impl Example {
 }
 
 fn of_key(object: &Object, key: &Key) -> ReferenceEntry {
-    let refused = (!key.refused.is_empty() && key.language != Languages::Lua).then_some((key.refused, key.code.0));
+    let refused = (!key.refused.is_empty()).then_some((key.refused, key.code.0));
     ReferenceEntry {
         name: key.name,
         of: Some(object.name),
