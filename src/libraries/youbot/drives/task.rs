@@ -5,6 +5,8 @@ use crate::libraries::youbot::rigid_body::J5;
 
 /// Peak joint speed of folding and unfolding, in rad/s; of joint 4 a ninth more.
 const MOTION_SPEED: f64 = 1.25;
+/// Its peak acceleration, in rad/s²: it takes less torque than [`PRESSES`] leaves.
+const MOTION_ACCELERATION: f64 = 2.0;
 /// How close to its end a motion must come, in rad, and how much later than planned, in s.
 const ARRIVAL_ERROR: f64 = 0.03;
 const ARRIVAL_TIME: f64 = 3.0;
@@ -29,7 +31,7 @@ const PARTS: [(f64, f64); JOINTS] = [(0.0, 1.0), (0.0, 0.4), (0.4, 1.0), (0.1, 1
 /// robot. Something in the way is pressed on with no more.
 const PRESSES: J5 = J5::new(4.0, 4.2, 3.2, 1.5, 0.8);
 /// As long as a joint gives all of that it may be slow; then it has met something, in s.
-const PRESSED_TIME: f64 = 0.1;
+const PRESSED_TIME: f64 = 0.15;
 /// For a base that rolls on a motion waits so long, in s.
 const ROLLS_OUT: f64 = 1.0;
 
@@ -66,9 +68,9 @@ impl Motion {
     }
 }
 
-/// In how many seconds a joint goes that far, in rad: a quintic's peak speed is 15/8 of its mean.
+/// In how many seconds a joint goes that far, in rad: a quintic's peak speed is 15/8 of its mean, its peak acceleration 10/√3 of way by time squared.
 fn takes(way: f64) -> f64 {
-    way.abs() / MOTION_SPEED * 1.875
+    (way.abs() / MOTION_SPEED * 1.875).max((way.abs() * 5.774 / MOTION_ACCELERATION).sqrt())
 }
 
 #[derive(Debug, Clone, Copy)]
