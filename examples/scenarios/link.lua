@@ -9,11 +9,13 @@ local function until_both(state, seconds)
   wait_state("right:" .. state, seconds)
   return now()
 end
-local function nets(property, value)
-  for _, net in ipairs{ "To_Right", "To_Left" } do set(net .. "." .. property, value, { force = true, within = 1 }) end
-  return now()
+-- What goes wrong with both networks at a moment of the clock: a fault of the world, which no configuration knows of.
+local function nets(fault, parameters)
+  local at = now() + 0.1
+  for _, net in ipairs{ "To_Right", "To_Left" } do inject(net, fault, parameters, at) end
+  return at
 end
-local function back(property) for _, net in ipairs{ "To_Right", "To_Left" } do undo(net .. "." .. property) end end
+local function heal() for _, net in ipairs{ "To_Right", "To_Left" } do inject(net, "heal") end end
 local function norm(s, name)
   local x, y, z, all = s:values(name .. "_x"), s:values(name .. "_y"), s:values(name .. "_z"), {}
   for i = 1, #x do all[i] = math.sqrt(x[i]^2 + y[i]^2 + z[i]^2) end
@@ -43,7 +45,7 @@ until_both("five_DOF_mode", 0.01)
 wait(5)
 
 -- Cut, for 2 s. Which of the two robots is told first is not said; each lets go by itself.
-local s, at = forces("cut"), nets("cut", true)
+local s, at = forces("cut"), nets("cut", { seconds = 2 })
 wait_answer("left/e_link_lost", 0.5)
 local lost = now()
 wait_state("left:unsync", 0.01)
@@ -55,8 +57,7 @@ expect{ name = "cut: e_link_lost after", value = lost - at, max = 0.12, unit = "
 expect{ name = "cut: disable_copying behind it", value = disabled - lost, max = 0.005, unit = "s" }
 expect{ name = "cut: force after 0.16 s", value = math.max(after(s, "left", at + 0.16), after(s, "right", at + 0.16)), max = 0.1, unit = "N" }
 hand("align 8; free 600")
-back("cut")
-local healed = now()
+local healed = at + 2
 expect{ name = "healed: harmonizing after", value = until_both("harmonizing", 3) - healed, min = 1.0, max = 1.2, unit = "s" }
 until_both("five_DOF_mode", 20)
 hand(SWAY)
@@ -70,14 +71,14 @@ expect{ name = "healed: the base went, with five", unit = "m", max = 0.002,
 both("e_8dof")
 until_both("eight_DOF_mode", 0.01)
 wait(3)
-local s, at = sample{ every = 0.001, name = "slow", signals = { "left/Cart_Impedance.active", "right/Cart_Impedance.active" } }, nets("delay", 0.05)
+local s, at = sample{ every = 0.001, name = "slow", signals = { "left/Cart_Impedance.active", "right/Cart_Impedance.active" } }, nets("delay", { delay = 0.05 })
 wait_answer("left/e_qos_degraded", 0.5)
 expect{ name = "50 ms: e_qos_degraded after", value = now() - at, max = 0.1, unit = "s" }
 until_both("five_DOF_mode", 0.1)
 both("e_8dof")
 wait(5)
 until_both("five_DOF_mode", 0)
-back("delay")
+heal()
 until_both("five_DOF_mode.free", 5)
 wait(1)
 until_both("five_DOF_mode.free", 0)
@@ -88,23 +89,23 @@ until_both("eight_DOF_mode", 0.01)
 wait(2)
 
 -- A third of the packets lost: the same.
-nets("loss", 0.3)
+nets("loss", { loss = 0.3 })
 until_both("five_DOF_mode.degraded", 2)
-back("loss")
+heal()
 until_both("five_DOF_mode.free", 5)
 both("e_8dof")
 until_both("eight_DOF_mode", 0.01)
 wait(2)
 
 -- 150 ms: that is no link any more.
-local at = nets("delay", 0.15)
+local at = nets("delay", { delay = 0.15 })
 wait_answer("left/e_link_lost", 1)
 expect{ name = "150 ms: e_link_lost after", value = now() - at, max = 0.25, unit = "s" }
 until_both("unsync", 0.2)
 wait(3)
 until_both("unsync", 0)
 hand("align 8; free 600")
-back("delay")
+heal()
 until_both("eight_DOF_mode", 20)
 wait(2)
 

@@ -17,8 +17,8 @@ for _, cut in ipairs{ { net = "To_Right", deaf = "right", heard = "left" }, { ne
     for i = 0, 2 do signals[robot .. "_f" .. i] = robot .. "/Cart_Impedance.f_des[" .. i .. "]" end
   end
   local s = sample{ every = 0.001, name = cut.net, signals = signals }
-  set(cut.net .. ".cut", true, { force = true, within = 1 })
-  local at = now()
+  local at = now() + 0.1
+  inject(cut.net, "cut", { seconds = 3 }, at)
   wait_answer(cut.deaf .. "/e_link_lost", 0.5)
   wait_state(cut.deaf .. ":unsync", 0.01)
   wait_state(cut.heard .. ":harmonizing", 5)
@@ -35,8 +35,7 @@ for _, cut in ipairs{ { net = "To_Right", deaf = "right", heard = "left" }, { ne
     if t >= at + 0.4 then worst.copying = math.max(worst.copying, v.left[i], v.right[i]) end
   end
   set("left/Operator.script", "align 8; free 600", { force = true, within = 1 })
-  undo(cut.net .. ".cut")
-  at = now()
+  at = at + 3
   wait_state("left:copying", 20)
   wait_state("right:copying", 20)
   worst.again = math.max(worst.again, now() - at)

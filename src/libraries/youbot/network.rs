@@ -1,5 +1,9 @@
 //! A network that delays, jitters, reorders, duplicates, loses, is slow and stands still; seeded, so that a run can be repeated.
 
+mod faults;
+
+pub use faults::{NetworkFault, NetworkFaults};
+
 use std::collections::VecDeque;
 
 /// A small generator (SplitMix64): repeatable, and good enough to lose packets with.

@@ -7,6 +7,7 @@ mod impedance;
 mod kinematics;
 mod link;
 mod net;
+mod net_faults;
 mod operator;
 mod passivity;
 mod peer;

@@ -1,12 +1,14 @@
 //! `youbot.Net`: one direction of the network between the two robots; and its properties, which the stand-in for the other
 //! robot has as well.
 
+use super::net_faults::offer_network_faults;
 use crate::libraries::youbot::link::{Echo, Packet};
-use crate::libraries::youbot::network::{Network, NetworkCounts, Quality, WAITING};
+use crate::libraries::youbot::network::{Network, NetworkCounts, NetworkFaults, Quality, WAITING};
 use crate::model::Tunable;
 use crate::runtime::{Builder, Component, Context, In, OperationAnswer, Out, Prop};
+use crate::time::Time;
 
-/// How a network is doing, as properties.
+/// How a network is doing: as its properties say, but for what was injected.
 pub(super) struct NetworkProperties {
     delay: Prop<f64>,
     jitter: Prop<f64>,
@@ -21,10 +23,12 @@ pub(super) struct NetworkProperties {
     clock_offset: Prop<f64>,
     clock_drift: Prop<f64>,
     seed: Prop<i64>,
+    faults: NetworkFaults,
 }
 
 impl NetworkProperties {
-    pub(super) fn declare<C: Component>(b: &mut Builder<C>) -> Self {
+    pub(super) fn declare<C: Component>(b: &mut Builder<C>, own: fn(&mut C) -> &mut Self) -> Self {
+        offer_network_faults(b, move |c| &mut own(c).faults);
         let q = Quality::default();
         Self {
             delay: b.doc("One way.").unit("s").range(0.0..=1.0).property("delay", 0.002),
@@ -67,11 +71,12 @@ impl NetworkProperties {
                 .range(-500.0..=500.0)
                 .property("clock_drift", 0.0),
             seed: b.doc("Of the network's luck.").tunable(Tunable::Unconfigured).property("seed", 1_i64),
+            faults: NetworkFaults::default(),
         }
     }
 
-    pub(super) fn quality(&mut self) -> Quality {
-        Quality {
+    pub(super) fn quality(&mut self, now: Time) -> Quality {
+        let should = Quality {
             delay: self.delay.get(),
             jitter: self.jitter.get(),
             reorder: self.reorder.get(),
@@ -82,7 +87,8 @@ impl NetworkProperties {
             burst_loss: self.burst_loss.get(),
             rate: self.rate.get(),
             cut: self.cut.get(),
-        }
+        };
+        self.faults.over(now, should)
     }
 
     pub(super) fn seed(&mut self) -> u64 {
@@ -124,7 +130,7 @@ impl Component for Net {
              duplicates, loses one by one and in bursts, is slow, and can be cut; what it does is decided by the seed.",
         )
         .on_configure(|c, _| {
-            c.network = Network::new(c.properties.quality(), c.properties.seed());
+            c.network = Network::new(Quality::default(), c.properties.seed());
             Ok(())
         })
         .on_stop(|c, _| {
@@ -139,14 +145,14 @@ impl Component for Net {
             rx: b.doc("Packets from Link_Tx of one robot.").buffered().required().input("rx"),
             tx: b.doc("Packets for Link_Rx of the other, for a buffered connection.").output("tx"),
             counts: b.doc("What became of the packets so far.").output("counts"),
-            properties: NetworkProperties::declare(b),
+            properties: NetworkProperties::declare(b, |c| &mut c.properties),
             network: Network::new(Quality::default(), 1),
         }
     }
 
     fn update(&mut self, cx: &mut Context) {
         let now = cx.now().as_secs_f64();
-        self.network.quality = self.properties.quality();
+        self.network.quality = self.properties.quality(cx.now());
         while let Some(packet) = self.rx.take() {
             self.network.send(now, packet);
         }

@@ -150,7 +150,7 @@ impl Component for Peer {
                 .doc("Of its coupling, as of Cart_Impedance.")
                 .tunable(Tunable::Unconfigured)
                 .property("law", "position".to_owned()),
-            network: NetworkProperties::declare(b),
+            network: NetworkProperties::declare(b, |c| &mut c.network),
             jump: b
                 .doc("Added to the positions the other robot sends: a corrupt sensor.")
                 .unit("m")
@@ -169,7 +169,7 @@ impl Component for Peer {
             }
         }
         let now = cx.now().as_secs_f64();
-        let (quality, ahead) = (self.network.quality(), self.network.clock_difference(now));
+        let (quality, ahead) = (self.network.quality(cx.now()), self.network.clock_difference(now));
         let w = &mut *self.world;
         w.to_peer.quality = quality;
         w.from_peer.quality = quality;

@@ -1,7 +1,9 @@
 //! `youbot.Udp`: a robot's end of the network, over UDP.
 
+use super::net_faults::offer_network_faults;
 use crate::libraries::youbot::datagram::{DatagramLink, Received};
 use crate::libraries::youbot::link::Packet;
+use crate::libraries::youbot::network::{Network, NetworkFaults, Quality};
 use crate::model::Tunable;
 use crate::runtime::{Builder, Component, Context, In, Out, Prop};
 
@@ -34,21 +36,28 @@ pub struct Udp {
     peer: Prop<String>,
     link: Option<DatagramLink>,
     counted: DatagramCounts,
+    /// What is wrong with the network, for what is sent; what is lost there was never given to the socket.
+    faults: NetworkFaults,
+    outgoing: Network<Packet>,
 }
 
 impl Component for Udp {
     fn new(b: &mut Builder<Self>) -> Self {
         b.describe(
             "A robot's end of the network, over UDP: what its Link_Tx sends goes to `peer`, and what `peer` sends to its Link_Rx, in steps of \
-             its activity's period. Never waits. On the simulated clock packets take no time.",
+             its activity's period. Never waits. On the simulated clock packets take no time. Faults that are injected are of what it sends.",
         )
         .exclusive("udp:{bind}")
         .on_configure(|c, _| {
             c.link = Some(DatagramLink::open(c.bind.get_ref(), c.peer.get_ref())?);
             c.counted = DatagramCounts::default();
+            // Each end has a luck of its own.
+            let seed = c.bind.get_ref().bytes().fold(0, |sum: u64, byte| sum.wrapping_mul(31).wrapping_add(byte.into()));
+            c.outgoing = Network::new(Quality::default(), seed);
             Ok(())
         })
         .on_start(|c, _| {
+            c.outgoing.clear();
             // What came while nobody listened is old; who sends without end is not waited for.
             if let Some(link) = &c.link {
                 std::iter::from_fn(|| link.receive()).take(STALE).for_each(drop);
@@ -59,6 +68,7 @@ impl Component for Udp {
             c.link = None;
             Ok(())
         });
+        offer_network_faults(b, |c| &mut c.faults);
         Self {
             rx: b.doc("Packets from Link_Tx of its robot.").buffered().required().input("rx"),
             tx: b.doc("Packets for Link_Rx of its robot, for a buffered connection.").output("tx"),
@@ -73,12 +83,19 @@ impl Component for Udp {
                 .property("peer", "127.0.0.1:4001".to_owned()),
             link: None,
             counted: DatagramCounts::default(),
+            faults: NetworkFaults::default(),
+            outgoing: Network::new(Quality::default(), 1),
         }
     }
 
-    fn update(&mut self, _: &mut Context) {
+    fn update(&mut self, cx: &mut Context) {
         let Some(link) = &self.link else { return };
+        let now = cx.now().as_secs_f64();
+        self.outgoing.quality = self.faults.over(cx.now(), Quality::default());
         while let Some(packet) = self.rx.take() {
+            self.outgoing.send(now, packet);
+        }
+        while let Some(packet) = self.outgoing.receive(now) {
             let sent = if link.send(&packet) { &mut self.counted.sent } else { &mut self.counted.unsent };
             *sent += 1;
         }
