@@ -192,3 +192,39 @@ fn what_is_not_confirmed_while_another_one_is_stopped_is_followed() {
         a_up = Configuration { on_failure = 'rollback', confirm = { event = 'e_yes', within = 0.5 }, operation_call('a.raise') },";
     assert!(refused_beside(configurations, coordinator, "a safe configuration is in force"));
 }
+
+/// Their way up and down is looked for group by group: that of twelve, each of which waits for two things, is the sum of theirs, where their
+/// product is more than is looked at.
+#[test]
+fn the_way_of_many_that_have_nothing_to_do_with_each_other_is_found() {
+    let names: Vec<String> = (0..12).map(|n| format!("d{n}")).collect();
+    let parts: Vec<(String, String)> = names.iter().map(|name| waits_twice(name)).collect();
+    let configurations: String = parts.iter().map(|(configurations, _)| configurations.as_str()).collect();
+    let coordinators: Vec<(&str, &str)> =
+        names.iter().zip(&parts).map(|(name, (_, coordinator))| (name.as_str(), coordinator.as_str())).collect();
+    let report = followed(&Small::several(&configurations, &coordinators, ""), false);
+    assert!(report.checked.is_some(), "{:#?}", report.findings);
+    let timely = |left: &String| !left.contains("comes up, or down, in time");
+    assert!(report.left.iter().all(timely), "{:#?}", report.left);
+}
+
+/// A drive that is up when two things have been said to its coordinator.
+fn waits_twice(name: &str) -> (String, String) {
+    let configurations = format!("{name}_base = Configuration {{ create('{name}', 'Drive') }},\n");
+    let coordinator = format!(
+        "idle = state {{}}, starting = state {{ entry = '{name}_base' }}, made = state {{}}, armed = state {{}}, up = state {{}},
+         leaving = state {{ entry = '{name}_base.undo' }},
+         trans {{ src = 'initial', tgt = 'idle' }},
+         trans {{ src = 'idle', tgt = 'starting', events = {{ 'e_start' }} }},
+         trans {{ src = 'starting', tgt = 'made', events = {{ '{name}_base.ok' }} }},
+         trans {{ src = 'starting', tgt = 'idle', events = {{ '{name}_base.failed', '{name}_base.cancelled' }} }},
+         trans {{ src = 'starting', tgt = 'leaving', events = {{ '{name}_base.broken' }} }},
+         trans {{ src = 'made', tgt = 'armed', events = {{ 'e_{name}_arm' }} }},
+         trans {{ src = 'armed', tgt = 'up', events = {{ 'e_{name}_go' }} }},
+         trans {{ src = 'made', tgt = 'leaving', events = {{ 'e_shutdown' }} }},
+         trans {{ src = 'armed', tgt = 'leaving', events = {{ 'e_shutdown' }} }},
+         trans {{ src = 'up', tgt = 'leaving', events = {{ 'e_shutdown' }} }},
+         trans {{ src = 'leaving', tgt = 'idle', events = {{ '{name}_base.undone', '{name}_base.undo.failed', '{name}_base.undo.broken' }} }},"
+    );
+    (configurations, coordinator)
+}
