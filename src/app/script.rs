@@ -30,7 +30,7 @@ use crate::session::{Ended, NO_FORWARD, NotNamed, Session, Unanswered, recovery}
 use crate::time::{Clock, Time};
 use failure::IsRefused;
 pub use failure::ScriptFailure;
-pub use figures::{Figure, digits};
+pub use figures::{Figure, beside, digits};
 pub use interrupt::Interrupt;
 use mlua::{FromLua, Lua, Table, Value as LuaValue};
 use options::{OptionFields, force};

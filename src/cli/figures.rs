@@ -22,7 +22,7 @@ pub fn table(out: &Output, figures: &[Figure]) -> String {
             true => out.paint(Style::Good, "ok"),
             false => out.paint(Style::Bad, "missed"),
         };
-        table.row([out.paint(Style::Name, &figure.name), figure.with_unit(figure.value), expected, end]);
+        table.row([out.paint(Style::Name, &figure.name), figure.shown(), expected, end]);
     }
     table.to_string()
 }

@@ -8,7 +8,7 @@ use super::output::{self, Output, Style, Table};
 use super::run::known;
 use super::signals::SignalWatch;
 use super::{CommandContext, CommandFailure, CommandResult, Run};
-use crate::app::script::digits;
+use crate::app::script::{beside, digits};
 use crate::diagnostics::SourceMap;
 use crate::lang::Sources;
 use crate::limits;
@@ -184,7 +184,10 @@ fn show(out: &Output, axes: &[GridAxis], points: &[Vec<&str>], runs: &[PointRun]
         row.extend(columns.iter().map(|(name, _)| match figure(run, name) {
             None => "–".to_owned(),
             Some(figure) => {
-                let value = figure["value"].as_f64().map_or_else(|| "NaN".to_owned(), digits);
+                let of = |key: &str| figure[key].as_f64();
+                let shown =
+                    |value| digits(if figure["ok"] == true { beside(value, of("min"), of("max")) } else { value });
+                let value = of("value").map_or_else(|| "NaN".to_owned(), shown);
                 if figure["ok"] == true { value } else { out.paint(Style::Bad, format!("{value} !")) }
             }
         }));

@@ -213,6 +213,11 @@ fn verdict(out: &Output, monitor: &Json) -> String {
     }
 }
 
+/// The path of the subsystem whose monitor it is.
+fn path_of(monitor: &Json) -> &str {
+    text(&monitor["component"]).rsplit_once('/').map_or("", |(path, _)| path)
+}
+
 fn margin(monitor: &Json) -> String {
     monitor["robustness"].as_f64().map_or_else(String::new, |margin| format!("{margin:+.4}"))
 }
@@ -231,9 +236,12 @@ fn line(out: &Output, look: &Json, depth: Option<usize>) -> String {
         frames,
     ];
     let monitors = look["monitors"].as_array().into_iter().flatten();
-    parts.extend(
-        monitors.map(|it| format!("{}: {} {}", text(&it["name"]), verdict(out, it), margin(it)).trim_end().to_owned()),
-    );
+    let unfolded = monitors.filter(|it| level(path_of(it)) <= depth.unwrap_or(usize::MAX));
+    parts.extend(unfolded.map(|it| {
+        let (path, name) = (path_of(it), text(&it["name"]));
+        let name = if path.is_empty() { name.to_owned() } else { format!("{path}/{name}") };
+        format!("{name}: {} {}", verdict(out, it), margin(it)).trim_end().to_owned()
+    }));
     let faults = status["faults"].as_array().into_iter().flatten();
     parts.extend(
         faults.map(|it| out.paint(Style::Bad, format!("fault {}: {}", text(&it["component"]), text(&it["reason"])))),

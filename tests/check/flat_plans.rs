@@ -2,7 +2,7 @@
 
 use davit::app;
 use davit::lang::LoadOptions;
-use davit::runtime::Libraries;
+use davit::libraries;
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -59,10 +59,11 @@ fn configurations(seed: u64, before: &str) -> String {
 }
 
 /// The steps of these configurations, one after the other, as `davit plan` has them.
-fn planned(folder: &Path, file: &str, ids: &[String]) -> Vec<String> {
-    let read = app::read(&folder.join(file), &LoadOptions::default(), Libraries::default());
-    let read = read.unwrap_or_else(|refused| panic!("{file}: {:#?}", refused.findings));
-    let applications = app::plan(&read, ids).unwrap_or_else(|findings| panic!("{file}: {findings:#?}"));
+pub fn planned(file: &Path, ids: &[String]) -> Vec<String> {
+    let name = file.display();
+    let read = app::read(file, &LoadOptions::default(), libraries::builtin());
+    let read = read.unwrap_or_else(|refused| panic!("{name}: {:#?}", refused.findings));
+    let applications = app::plan(&read, ids).unwrap_or_else(|findings| panic!("{name}: {findings:#?}"));
     let steps = applications.iter().flat_map(|application| &application.steps);
     steps.map(|planned| format!("{} undone by {:?}", planned.step, planned.undo)).collect()
 }
@@ -100,8 +101,8 @@ fn composed_and_written_flat_the_steps_are_the_same() {
         write("whole.yaml", &head("whole", &format!("configurations: [whole.lua]\nsubsystems:\n{subsystems}")));
         write("flat.lua", &format!("ConfiguratorConf {{ {flat} {} }}", couple("/C0.a", "/C1.b", "/C1.k")));
         write("flat.yaml", &head("whole", "configurations: [flat.lua]\n"));
-        let composed = planned(folder.path(), "whole.yaml", &ids);
+        let composed = planned(&folder.path().join("whole.yaml"), &ids);
         assert!(composed.len() > 10, "{seed}: {composed:?}");
-        assert_eq!(composed, planned(folder.path(), "flat.yaml", &ids), "{seed}");
+        assert_eq!(composed, planned(&folder.path().join("flat.yaml"), &ids), "{seed}");
     }
 }

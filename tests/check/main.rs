@@ -18,6 +18,7 @@ mod circles;
 mod composed;
 mod demands;
 mod exclusive;
+mod flat_coupling;
 mod flat_plans;
 mod follow;
 mod pointed;

@@ -52,17 +52,20 @@ pub fn example(file: &str) -> String {
 }
 
 /// Takes the deployment down whatever the test found.
-struct DeployedCell(Demo);
+pub struct DeployedCell(Demo);
 
 impl DeployedCell {
     fn new() -> Self {
-        let demo = cell();
-        deploy(&demo, "cell.yaml");
+        Self::of(cell(), "cell.yaml")
+    }
+
+    pub fn of(demo: Demo, file: &str) -> Self {
+        deploy(&demo, file);
         Self(demo)
     }
 
     /// What is printed, without the times and what else differs from run to run.
-    fn shows(&self, args: &[&str]) -> String {
+    pub fn shows(&self, args: &[&str]) -> String {
         let ran = self.0.run(args);
         assert_eq!(ran.code, 0, "{args:?}: {}{}", ran.out, ran.err);
         timeless(&ran.out)
@@ -82,7 +85,7 @@ impl Drop for DeployedCell {
 }
 
 /// Numbers with a fraction, and the blanks around them, are not compared.
-fn timeless(text: &str) -> String {
+pub fn timeless(text: &str) -> String {
     let is_time = |word: &&str| !(word.contains('.') && word.trim_start_matches('(').parse::<f64>().is_ok());
     let line = |line: &str| {
         let indent = line.len() - line.trim_start().len();

@@ -20,6 +20,7 @@ mod faults;
 mod force;
 mod foreground;
 mod foreign;
+mod guides;
 mod hierarchy;
 mod hot_swap;
 mod ignored;

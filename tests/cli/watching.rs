@@ -32,6 +32,12 @@ const MONITORS: &str = "monitors:
 
 /// With components that run, and monitors.
 fn live() -> Deployed {
+    let demo = files();
+    deploy(&demo, "deployment.yaml");
+    Deployed(demo)
+}
+
+fn files() -> Demo {
     let demo = Demo::new();
     let text = demo.read("deployment.yaml").replace("platform: simulated", "platform: embedded\nlibraries: [standard]");
     let types = text.find("types:").unwrap()..text.find("activities:").unwrap();
@@ -41,8 +47,53 @@ fn live() -> Deployed {
     );
     demo.write("configurations.lua", CONFIGURATIONS);
     demo.write("monitors.yaml", MONITORS);
-    deploy(&demo, "deployment.yaml");
-    Deployed(demo)
+    demo
+}
+
+/// Two of them in one deployment.
+const BOTH: &str = "davit: 1
+name: both
+platform: embedded
+libraries: [standard]
+subsystems: { one: { deployment: deployment.yaml }, two: { deployment: deployment.yaml } }
+configurations: []
+coordinator: both.lua
+deploy: { event: e_start, up: on, within_s: 60 }
+shutdown: { event: e_shutdown, down: idle, within_s: 60 }
+";
+
+const BEGINS_BOTH: &str = "return state {
+  idle = state {}, one = state {}, two = state {}, on = state {}, lowering = state {},
+  trans { src = 'initial', tgt = 'idle' },
+  trans { src = 'idle', tgt = 'one', events = { 'e_start' }, effect = { 'one/e_start' } },
+  trans { src = 'one', tgt = 'two', events = { 'one/up' }, effect = { 'two/e_start' } },
+  trans { src = 'two', tgt = 'on', events = { 'two/up' } },
+  trans { src = 'on', tgt = 'lowering', events = { 'e_shutdown' }, effect = { 'one/e_shutdown', 'two/e_shutdown' } },
+  trans { src = 'lowering', tgt = 'idle', events = { 'one/down', 'two/down' } },
+}
+";
+
+/// Monitors of one name in two subsystems are told apart, as everything is: by the path.
+#[test]
+fn monitors_of_subsystems_have_their_paths() {
+    let demo = files();
+    demo.write("both.yaml", BOTH);
+    demo.write("both.lua", BEGINS_BOTH);
+    deploy(&demo, "both.yaml");
+    let deployed = Deployed(demo);
+    let line = |args: &[&str]| {
+        let ran = deployed.0.run(&[&["watch", "--count", "1"], args].concat());
+        assert_eq!((ran.code, ran.out.lines().count()), (0, 1), "{}{}", ran.out, ran.err);
+        ran.out
+    };
+    let all = line(&[]);
+    for words in ["  one/high: ", "  one/low: off", "  two/high: ", "  two/low: off"] {
+        assert!(all.contains(words), "{words}: {all}");
+    }
+    let inside = line(&["--in", "one"]);
+    assert!(inside.contains("  high: ") && !inside.contains("two"), "by the names of the file: {inside}");
+    let folded = line(&["--depth", "0"]);
+    assert!(!folded.contains("high"), "what is folded is not told one by one: {folded}");
 }
 
 #[test]

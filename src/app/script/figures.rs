@@ -35,6 +35,12 @@ impl Figure {
         format!("{}{unit}", digits(value))
     }
 
+    /// Its value as a table has it. What is next to nothing beside its bounds, and within them, is 0: what is left there of times and sums that
+    /// are not exact in binary is nothing that was measured.
+    pub fn shown(&self) -> String {
+        self.with_unit(if self.ok { beside(self.value, self.min, self.max) } else { self.value })
+    }
+
     /// What is expected: `at most 0.012 m`; nothing where nothing is.
     pub fn expected(&self) -> String {
         let least = self.min.map(|min| format!("at least {}", self.with_unit(min)));
@@ -46,6 +52,15 @@ impl Figure {
     fn missed(&self) -> String {
         format!("{} is {}, expected {}", self.name, self.with_unit(self.value), self.expected())
     }
+}
+
+/// Below that share of the larger one of its bounds a value is next to nothing.
+const NEXT_TO_NOTHING: f64 = 1e-9;
+
+/// A value that keeps its bounds; 0 where it is next to nothing beside them.
+pub fn beside(value: f64, min: Option<f64>, max: Option<f64>) -> f64 {
+    let largest = [min, max].into_iter().flatten().map(f64::abs).filter(|bound| bound.is_finite()).fold(0.0, f64::max);
+    if value.abs() < NEXT_TO_NOTHING * largest { 0.0 } else { value }
 }
 
 /// A number with as many digits as a person compares.
@@ -140,5 +155,15 @@ mod tests {
         let told = [0.0, 0.0123456789, -1.5, 123.456_789, 1_234_567.8, 1.0e9, 3.2e-7, 70.0, f64::NAN];
         let told = told.map(digits);
         assert_eq!(told, ["0", "0.012346", "-1.5", "123.4568", "1234568", "1.0000e9", "3.2000e-7", "70", "NaN"]);
+    }
+
+    #[test]
+    fn next_to_nothing_beside_a_bound_is_nothing() {
+        let told = |value, min, max| digits(beside(value, min, max));
+        assert_eq!(told(7.1e-12, None, Some(5.0)), "0");
+        assert_eq!(told(-7.1e-12, Some(-5.0), Some(1e-3)), "0");
+        assert_eq!(told(7.1e-12, None, Some(1e-9)), "7.1000e-12", "that is a measurable share of it");
+        assert_eq!(told(7.1e-12, Some(0.0), None), "7.1000e-12", "beside 0 nothing is small");
+        assert_eq!(told(7.1e-12, None, None), "7.1000e-12");
     }
 }

@@ -5,7 +5,7 @@ use crate::libraries::youbot::parameters::JOINTS;
 use crate::runtime::{Builder, Failure};
 
 /// A fault of the drives.
-pub(super) struct Fault {
+pub(super) struct DriveFault {
     /// As `comm_fault` and scripts call it.
     pub(super) name: &'static str,
     /// The event that tells it.
@@ -18,15 +18,15 @@ pub(super) struct Fault {
     what: &'static str,
 }
 
-const fn fault(name: &'static str, event: &'static str, flag: i64, of_a_motor: bool, what: &'static str) -> Fault {
-    Fault { name, event, flag, of_a_motor, what }
+const fn fault(name: &'static str, event: &'static str, flag: i64, of_a_motor: bool, what: &'static str) -> DriveFault {
+    DriveFault { name, event, flag, of_a_motor, what }
 }
 
 /// The fault of a motor that gave too much for too long.
 pub(super) const I2T: &str = "i2t";
 
 /// All of them.
-pub(super) const FAULTS: [Fault; 9] = [
+pub(super) const FAULTS: [DriveFault; 9] = [
     fault("overcurrent", "e_OVERCURRENT", 0x01, true, "A motor takes too much current"),
     fault("undervoltage", "e_UNDERVOLTAGE", 0x02, false, "The drives have too little voltage"),
     fault("hall", "e_HALL_ERR", 0x10, true, "A Hall sensor fails"),
@@ -41,7 +41,7 @@ pub(super) const FAULTS: [Fault; 9] = [
 impl Driver {
     /// What a script may inject: each fault by its name, one of a motor with the joint that the motor drives.
     pub(super) fn offer_faults(b: &mut Builder<Self>) {
-        for Fault { name, event, of_a_motor, what, .. } in &FAULTS {
+        for DriveFault { name, event, of_a_motor, what, .. } in &FAULTS {
             let none = move || Failure(format!("no fault `{name}`"));
             let words = format!("{what}; the drives hold, {event}.");
             if *of_a_motor {
