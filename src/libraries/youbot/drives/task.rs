@@ -31,7 +31,7 @@ const PARTS: [(f64, f64); JOINTS] = [(0.0, 1.0), (0.0, 0.4), (0.4, 1.0), (0.1, 1
 /// robot. Something in the way is pressed on with no more.
 const PRESSES: J5 = J5::new(4.0, 4.2, 3.2, 1.5, 0.8);
 /// As long as a joint gives all of that it may be slow; then it has met something, in s.
-const PRESSED_TIME: f64 = 0.15;
+const PRESSED_TIME: f64 = 0.12;
 /// For a base that rolls on a motion waits so long, in s.
 const ROLLS_OUT: f64 = 1.0;
 
