@@ -3,33 +3,12 @@
 //! and monitors report comes all the same, where they have reason to: [`bars`](super::bars).
 
 use super::edges::Barred;
+use super::from_outside::{FromOutside, Raises};
 use super::product::Product;
 use super::reactions::triggers;
 use super::state::{Move, ProductState};
 use crate::model::{Ask, EventName, FAULTED, Monitor, Verdict};
 use crate::statechart::EventId;
-
-/// Who may still raise an event from outside while the deployment is being stopped.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Raises {
-    /// Nobody.
-    Nobody,
-    /// A component that fails, or one or a monitor that reports it where it has reason to.
-    Sometimes,
-    /// A component, if one does: the types of this platform do not say what they raise.
-    Perhaps,
-    /// Somebody from outside; or it comes by itself.
-    Somebody,
-}
-
-/// What is known of an event from outside wherever it comes: it is asked for again and again.
-#[derive(Debug, Clone, Copy)]
-pub struct FromOutside {
-    /// Coordinators tell it each other.
-    pub told_between: bool,
-    /// Who may raise it, or one that is followed as it, while the deployment is being stopped.
-    raises: Raises,
-}
 
 impl Product<'_> {
     /// What is known of each event from outside.

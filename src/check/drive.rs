@@ -4,7 +4,7 @@
 //! Where nothing is waited for but events of components or operators, the shortest series of events is taken that leads
 //! to the goal.
 
-use super::closed::Raises;
+use super::from_outside::Raises;
 use super::lasts::{Soonest, soonest};
 use super::members::Member;
 use super::outcome::Held;

@@ -39,6 +39,7 @@ mod failing;
 #[cfg(any(test, feature = "internals"))]
 mod follow;
 mod frame_orders;
+mod from_outside;
 mod frontier;
 mod heard;
 mod held;

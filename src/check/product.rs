@@ -12,11 +12,11 @@
 
 use super::aside::Aside;
 use super::children::{Child, WatchedSubsystem};
-use super::closed::FromOutside;
 use super::coordinator::outside_events;
 use super::coupling;
 use super::desks::{Desks, PlainBatch};
 use super::effort::{Effort, Left};
+use super::from_outside::FromOutside;
 use super::members::{Member, hears_loss, members};
 use super::neighbours::ParentInterface;
 use super::offers::AllOffers;

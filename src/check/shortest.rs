@@ -15,11 +15,11 @@ use rustc_hash::FxHashSet;
 use std::collections::VecDeque;
 
 /// Some of the coordinators, by their places; none: all of them.
-type Part<'p> = Option<&'p [usize]>;
+type Among<'p> = Option<&'p [usize]>;
 
 impl Product<'_> {
     /// Whether these coordinators are all inside the goal.
-    fn are_in(&self, state: &ProductState, goal: Goal, part: Part<'_>) -> bool {
+    fn are_in(&self, state: &ProductState, goal: Goal, part: Among<'_>) -> bool {
         let Some(part) = part else { return self.all_in(state, goal) };
         part.iter().all(|at| {
             let (member, leaf) = (&self.members[*at], state.leaves[*at]);
@@ -28,7 +28,7 @@ impl Product<'_> {
     }
 
     /// Whether something that comes from outside is for nobody but these.
-    fn concerns(&self, by: Move, part: Part<'_>) -> bool {
+    fn concerns(&self, by: Move, part: Among<'_>) -> bool {
         let Some(part) = part else { return true };
         match by {
             Move::Event(at) => {
@@ -89,7 +89,7 @@ fn search(
     from: ProductState,
     tried: &Tried,
     goal: Goal,
-    part: Part<'_>,
+    part: Among<'_>,
     begins: bool,
 ) -> Way {
     let mut states: Vec<(ProductState, Option<usize>, Vec<Next>)> = Vec::new();
