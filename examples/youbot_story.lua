@@ -5,13 +5,14 @@
 
 deploy("../deployments/youbot_arm.yaml")
 wait_state("operational", 20)
+local up = now()
 
 wait_state("harmonizing", 5)            -- the link has been good for a second
 wait_state("copying", 15)               -- the arms are aligned
 wait_answer("eight_DOF.ok", 1)
 assert_running("Dynamics")
 
-wait(15 - now())                       -- the hand of the operator begins to lead the arm to and fro
+wait(up + 10.43 - now())                -- the hand of the operator has begun to lead the arm to and fro
 
 -- A second of a mode, and what the coupling did in it: the force between the arms, and how far the base went.
 local function act(mode, way)

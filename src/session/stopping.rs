@@ -9,7 +9,7 @@ use super::{Command, Session, Unanswered};
 use crate::configurator::{FrameView, TakenDown};
 use crate::coordinator::Class;
 use crate::limits;
-use crate::model::{ConfigId, EventName, Step};
+use crate::model::{ConfigId, EventName, RequestId, Step};
 use crate::statechart::{EventId, NodeId};
 use crate::time::{Receiver, Time};
 use std::sync::atomic::Ordering;
@@ -76,15 +76,8 @@ impl Session {
         loop {
             // What panics in one of them is a defect of ours, and leaves it to the next.
             let began = survived(|| self.begin_stage(stage, why.take(), &mut told));
-            let (came, held) = began
-                .and_then(|safety| {
-                    survived(|| match (stage, safety) {
-                        // It came before force did: what it makes safe is let go by people alone.
-                        (Stage::Forced, Some(event)) => (Came::Left(format!("`{event}` came before")), HeldUp::Yes),
-                        (stage, _) => self.carry_out(stage, &mut told),
-                    })
-                })
-                .unwrap_or_else(|panic| {
+            let (came, held) =
+                began.and_then(|acted| survived(|| self.carry_out(stage, &acted, &mut told))).unwrap_or_else(|panic| {
                     let why = format!("davit itself has panicked: {panic}");
                     told.notes.push(why.clone());
                     (Came::Left(why), HeldUp::No)
@@ -123,17 +116,43 @@ impl Session {
         ended
     }
 
-    fn carry_out(&self, stage: Stage, told: &mut Announced) -> (Came, HeldUp) {
+    /// `acted`: what was asked for since a safety event came before to which no coordinator had reacted.
+    fn carry_out(&self, stage: Stage, acted: &[RequestId], told: &mut Announced) -> (Came, HeldUp) {
         match stage {
             Stage::Led => (self.lead_down(told), HeldUp::No),
             Stage::TakenBack => self.take_all_back(told),
-            Stage::Forced => self.force_all(told),
+            // It came before force did: what it has made safe is let go by people alone.
+            Stage::Forced => match self.is_made_safe(acted) {
+                HeldUp::No => self.force_all(told),
+                held => (Came::Left("a safety event came before".to_owned()), held),
+            },
         }
     }
 
-    /// A stage begins. A safety event that came before, to which no coordinator has reacted, acts by itself; it is answered if
-    /// something safe is applied for it.
-    fn begin_stage(&self, stage: Stage, why: Option<String>, told: &mut Announced) -> Option<EventName> {
+    /// Whether what these requests have made safe holds anything, once they are answered.
+    fn is_made_safe(&self, acted: &[RequestId]) -> HeldUp {
+        if acted.is_empty() {
+            return HeldUp::No;
+        }
+        let hub = self.hub();
+        let deadline = self.clock().now() + self.safe_takes() + limits::VIEW;
+        let answered = || acted.iter().all(|id| hub.answer(*id).is_some());
+        while !answered() && self.clock().now() < deadline {
+            hub.changed.wait(self.next_look(deadline));
+        }
+        if self.left_over().is_empty() { HeldUp::No } else { self.is_held() }
+    }
+
+    /// As long as what is safe may take.
+    fn safe_takes(&self) -> Duration {
+        let step = self.deployment().limits.step_timeout;
+        let safe = self.deployment().configurations.iter().filter(|c| c.safe);
+        safe.map(|c| c.timeout.unwrap_or(step).max(step)).sum()
+    }
+
+    /// A stage begins. A safety event that came before, to which no coordinator has reacted, acts by itself; what is asked for then is
+    /// answered.
+    fn begin_stage(&self, stage: Stage, why: Option<String>, told: &mut Announced) -> Vec<RequestId> {
         let hub = self.hub();
         if let Some(why) = &why {
             told.notes.push(format!("stopped {}: {why}", stage.words()));
@@ -146,16 +165,15 @@ impl Session {
         if let Err(panic) = survived(|| hub.note(Happening::Stopping { stage, why })) {
             told.notes.push(format!("who hears of it has panicked: {panic}"));
         }
-        let acts = |event: &EventName| {
-            let acted = make_safe(hub, self.configurator(), *event, Class::Report);
-            acted.is_some_and(|acted| !acted.requests.is_empty())
-        };
-        let acted: Vec<EventName> = unheard.into_iter().filter(acts).collect();
-        for event in &acted {
+        let mut asked: Vec<RequestId> = Vec::new();
+        for event in unheard {
+            let acted = make_safe(hub, self.configurator(), event, Class::Report);
+            let Some(acted) = acted.filter(|acted| !acted.requests.is_empty()) else { continue };
             let note = format!("`{event}` came before, and no coordinator had reacted to it: it acts by itself");
             self.note_all(vec![note], told);
+            asked.extend(acted.requests);
         }
-        acted.first().copied()
+        asked
     }
 
     /// Whether every coordinator is there.
@@ -285,10 +303,9 @@ impl Session {
         // What brings it to rest takes nothing of the time in which everything is removed.
         let step = self.deployment().limits.step_timeout;
         let takes = |of: Option<Duration>| of.unwrap_or(step).max(step);
-        let safe = self.deployment().configurations.iter().filter(|c| c.safe).map(|c| takes(c.timeout));
         let rest = self.deployment().all_rest().into_iter();
         let rest = rest.map(|id| takes(self.deployment().configuration(id).and_then(|c| c.timeout)));
-        let within = self.deployment().shutdown.within + safe.chain(rest).sum::<Duration>();
+        let within = self.deployment().shutdown.within + self.safe_takes() + rest.sum::<Duration>();
         let deadline = self.clock().now() + within;
         let Some(down) = self.stage_of(self.configurator().force_down(deadline), deadline) else {
             self.note_all(vec![Unanswered.to_string()], told);

@@ -440,6 +440,29 @@ fn an_emergency_that_nobody_has_reacted_to_when_force_begins_waits_for_people() 
     small.is_empty();
 }
 
+/// The same where nobody is there to ask: it is made safe all the same, and stays.
+#[test]
+fn an_emergency_that_nobody_has_reacted_to_is_acted_on_where_nobody_attends() {
+    let small = Small::up("lowering");
+    small.session.unattended();
+    small.session.raise(event("e_estop"), "test");
+    let ended = small.session.take_down(true);
+    assert!(small.heard("calm.ok"), "{:?}", small.heard.lock().unwrap());
+    let note = "`calm` is in force, and nobody is there to ask for force: what is left stays as it is";
+    assert!(!ended.left.is_empty() && ended.forced.iter().any(|told| told == note), "{ended:?}");
+}
+
+/// Where nothing is left nothing holds it.
+#[test]
+fn an_emergency_that_nobody_has_reacted_to_keeps_nobody_waiting_where_nothing_is_there() {
+    let small = Small::new("lowering", Vec::new());
+    small.session.unattended();
+    small.clock.sleep(Duration::from_secs(1));
+    small.session.raise(event("e_estop"), "test");
+    let ended = small.session.take_down(true);
+    assert!(ended.is_clean(), "{ended:?}");
+}
+
 /// When no coordinator hears it any more, a safety event acts by itself: the call under way is given up, and nothing moves.
 #[test]
 fn a_safety_event_acts_by_itself_once_nobody_leads() {
