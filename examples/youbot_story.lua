@@ -12,11 +12,11 @@ wait_state("copying", 15)               -- the arms are aligned
 wait_answer("eight_DOF.ok", 1)
 assert_running("Dynamics")
 
-wait(up + 10.43 - now())                -- the hand of the operator has begun to lead the arm to and fro
+wait(up + 15.4 - now())                 -- the hand of the operator leads the arm to and fro
 
 -- A second of a mode, and what the coupling did in it: the force between the arms, and how far the base went.
 local function act(mode, way)
-  wait(0.2)                             -- what the base still had of its speed
+  wait(0.5)                             -- what the base still had of its speed
   local s = sample{ every = 0.01, name = mode, signals = {
     force = "Cart_Impedance.f_raw_norm", x = "youbot.odometry.x", y = "youbot.odometry.y" } }
   wait(1)

@@ -59,10 +59,12 @@ pub enum Injection {
     },
     /// Its code panics.
     Panic,
-    /// Its code takes so long once.
+    /// Its code takes so long once; with an operation, the next call of that one takes so long more.
     Stall {
         /// How long.
         time: Duration,
+        /// The operation.
+        operation: Option<Ident>,
     },
 }
 
@@ -74,7 +76,11 @@ pub const GENERIC_INJECTIONS: [(&str, &str, &str); 3] = [
         "its code does not return any more, or does not from the next call of that operation on",
     ),
     ("panic", "", "its code panics, which leaves it faulted"),
-    ("stall", "seconds: float", "its code takes that long once, and its activity waits for it"),
+    (
+        "stall",
+        "seconds: float, operation: string = \"\"",
+        "its code takes that long once, and its activity waits for it; or the next call of that operation takes so long more",
+    ),
 ];
 
 /// The longest stall, in s: longer than any deadline of a story.
@@ -112,25 +118,18 @@ impl Injection {
             "panic" => fit(name, &[], given).map(|_| Self::Panic),
             "hang" => {
                 let values = fit(name, &[parameter("operation", ValueType::Str, Some(Value::str("")))], given)?;
-                let Some(Value::Str(text)) = values.first().filter(|text| **text != Value::str("")) else {
-                    return Ok(Self::Hang { operation: None });
-                };
-                let operation = ty.operations.keys().find(|known| known.as_str() == &**text);
-                match operation {
-                    Some(operation) => Ok(Self::Hang { operation: Some(*operation) }),
-                    None => {
-                        let known = ty.operations.keys().map(Ident::as_str);
-                        no(format!("{} has no operation `{text}`", ty.name), did_you_mean(text, "operations", known))
-                    }
-                }
+                Ok(Self::Hang { operation: operation(ty, values.first())? })
             }
             "stall" => {
-                let values = fit(name, &[parameter("seconds", ValueType::Float, None)], given)?;
+                let seconds = parameter("seconds", ValueType::Float, None);
+                let values =
+                    fit(name, &[seconds, parameter("operation", ValueType::Str, Some(Value::str("")))], given)?;
+                let operation = operation(ty, values.get(1))?;
                 let seconds = values.first().and_then(Value::as_f64).unwrap_or_default();
                 if !(seconds > 0.0 && seconds <= LONGEST_STALL) {
                     return no(format!("a stall of {seconds} s"), format!("more than 0 and at most {LONGEST_STALL}"));
                 }
-                Ok(Self::Stall { time: Duration::from_secs_f64(seconds) })
+                Ok(Self::Stall { time: Duration::from_secs_f64(seconds), operation })
             }
             _ => match ty.injections.iter().find(|(known, _)| known.as_str() == name) {
                 Some((known, declared)) => {
@@ -149,6 +148,18 @@ impl Injection {
                     no(format!("nothing called `{name}` can be injected into {}", ty.name), help)
                 }
             },
+        }
+    }
+}
+
+/// The operation that is meant by its name; the empty one means none.
+fn operation(ty: &ComponentType, name: Option<&Value>) -> Result<Option<Ident>, NoInjection> {
+    let Some(Value::Str(text)) = name.filter(|text| **text != Value::str("")) else { return Ok(None) };
+    match ty.operations.keys().find(|known| known.as_str() == &**text) {
+        Some(operation) => Ok(Some(*operation)),
+        None => {
+            let known = ty.operations.keys().map(Ident::as_str);
+            no(format!("{} has no operation `{text}`", ty.name), did_you_mean(text, "operations", known))
         }
     }
 }
@@ -195,7 +206,10 @@ impl fmt::Display for Injection {
             Self::Hang { operation: None } => f.write_str("hang"),
             Self::Hang { operation: Some(operation) } => write!(f, "hang of {operation}"),
             Self::Panic => f.write_str("panic"),
-            Self::Stall { time } => write!(f, "stall of {} s", time.as_secs_f64()),
+            Self::Stall { time, operation: None } => write!(f, "stall of {} s", time.as_secs_f64()),
+            Self::Stall { time, operation: Some(operation) } => {
+                write!(f, "stall of {operation} by {} s", time.as_secs_f64())
+            }
         }
     }
 }
@@ -233,6 +247,11 @@ mod tests {
             ("stall", vec![], "`stall` needs `seconds`"),
             ("stall", vec![("seconds", Value::Float(-1.0))], "a stall of -1 s"),
             ("hang", vec![("operation", Value::str("fold"))], "Drive has no operation `fold`"),
+            (
+                "stall",
+                vec![("seconds", Value::Int(1)), ("operation", Value::str("fold"))],
+                "Drive has no operation `fold`",
+            ),
         ] {
             let said = of(name, &given).unwrap_err();
             assert!(said.contains(says), "{name}: {said}");

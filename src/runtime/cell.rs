@@ -38,8 +38,10 @@ pub(crate) struct Cell {
     pub(crate) beat: Arc<Beat>,
     /// The component; none: it was taken out for good.
     pub(crate) gate: Gate<Option<Box<dyn Body>>>,
-    /// The operation that does not return when it is called next; `UNTRAPPED`: none.
+    /// The operation that is held up when it is called next; `UNTRAPPED`: none.
     trap: AtomicUsize,
+    /// For how long, in ns; `u64::MAX`: it does not return.
+    held: AtomicU64,
     /// The release (or, event-driven, the moment) of the last update since the last start; `NEVER`: none yet.
     last: AtomicU64,
 }
@@ -60,11 +62,14 @@ pub(crate) type CellGuard<'a> = gate::GateGuard<'a, Cell>;
 impl Cell {
     pub(crate) fn new(kind: Arc<ComponentFactory>, beat: Arc<Beat>, body: Box<dyn Body>) -> Self {
         let trap = AtomicUsize::new(UNTRAPPED);
-        Self { name: beat.name, kind, beat, gate: Gate::new(Some(body)), trap, last: AtomicU64::new(Time::NEVER.0) }
+        let (held, last) = (AtomicU64::new(0), AtomicU64::new(Time::NEVER.0));
+        Self { name: beat.name, kind, beat, gate: Gate::new(Some(body)), trap, held, last }
     }
 
-    /// The next call of that operation does not return.
-    pub(crate) fn trap(&self, operation: usize) {
+    /// The next call of that operation takes so long more; none: it does not return.
+    pub(crate) fn trap(&self, operation: usize, time: Option<Duration>) {
+        let time = time.map(|time| u64::try_from(time.as_nanos()).unwrap_or(u64::MAX));
+        self.held.store(time.unwrap_or(u64::MAX), Ordering::Relaxed);
         self.trap.store(operation, Ordering::Release);
     }
 
@@ -168,12 +173,15 @@ fn operate(
     let result = match body {
         None => Ok(Some(Reply::Refused("the component is gone".to_owned()))),
         Some(body) => guard::call(|| match asked {
-            CellRequest::Operation(index, _)
-                if cell.trap.compare_exchange(*index, UNTRAPPED, AcqRel, Relaxed).is_ok() =>
-            {
-                clock.hang()
+            CellRequest::Operation(index, args) => {
+                if cell.trap.compare_exchange(*index, UNTRAPPED, AcqRel, Relaxed).is_ok() {
+                    match cell.held.load(Relaxed) {
+                        u64::MAX => clock.hang(),
+                        time => clock.sleep(Duration::from_nanos(time)),
+                    }
+                }
+                body.operation(*index, args, &mut cx)
             }
-            CellRequest::Operation(index, args) => body.operation(*index, args, &mut cx),
             CellRequest::Injection(index, values) => body.inject(*index, values, &mut cx),
             CellRequest::Hang | CellRequest::Panic | CellRequest::Stall(_) => {
                 // It has happened now, whatever comes of it.

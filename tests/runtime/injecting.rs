@@ -144,6 +144,31 @@ fn a_stall_holds_the_activity_up_for_that_long() {
 }
 
 #[test]
+fn a_stall_of_an_operation_waits_for_its_next_call_and_ends() {
+    let b = drives();
+    let given = [("seconds", Value::Float(0.05)), ("operation", Value::str("quick"))];
+    b.inject("a", "stall", &given).unwrap();
+    let cycles = b.rounds().0;
+    b.wait(20 * MS);
+    assert!(b.rounds().0 - cycles >= 19, "nothing is held up yet");
+    let asked = b.clock.now();
+    assert!(matches!(b.run_within(&call("a.quick", vec![]), 100 * MS), Outcome::Done(_)));
+    assert!((50 * MS..60 * MS).contains(&b.clock.now().since(asked)), "once it is");
+    let asked = b.clock.now();
+    assert!(matches!(b.run_within(&call("a.quick", vec![]), 100 * MS), Outcome::Done(_)));
+    assert!(b.clock.now().since(asked) < 5 * MS, "once only");
+
+    // Behind its deadline it comes back all the same.
+    b.inject("a", "stall", &given).unwrap();
+    assert_eq!(b.run_within(&call("a.quick", vec![]), 20 * MS), Outcome::Unknown(Cause::Timeout));
+    assert_eq!(b.platform.quarantined(), [name("a")]);
+    b.wait(50 * MS);
+    assert_eq!(b.platform.quarantined(), []);
+    assert!(matches!(b.run_within(&call("a.quick", vec![]), 20 * MS), Outcome::Done(_)));
+    b.clock.shutdown();
+}
+
+#[test]
 fn a_hang_leaves_what_is_under_way_unknown() {
     let b = drives();
     let outcome = b.called("a.go", 50 * MS);
@@ -170,9 +195,6 @@ fn a_hang_of_an_operation_waits_for_its_next_call() {
     assert_eq!(b.run_within(&call("a.quick", vec![]), 20 * MS), Outcome::Unknown(Cause::Timeout));
     assert_eq!(b.platform.quarantined(), [name("a")]);
     let beside = b.inject("b", "hang", &[("operation", Value::str("beside"))]);
-    assert_eq!(
-        beside,
-        Err("`beside` runs beside `b`, in the thread of who calls it: it cannot be made to hang".to_owned())
-    );
+    assert_eq!(beside, Err("`beside` runs beside `b`, in the thread of who calls it: it cannot be held up".to_owned()));
     b.clock.shutdown();
 }

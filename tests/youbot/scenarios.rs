@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Each with what is set for it here: what takes a minute in the file is shorter.
-const SCENARIOS: [(&str, &[(&str, &str)]); 26] = [
+const SCENARIOS: [(&str, &[(&str, &str)]); 28] = [
     ("blocked", &[]),
     ("bring_up", &[]),
     ("configurator", &[]),
@@ -18,9 +18,11 @@ const SCENARIOS: [(&str, &[(&str, &str)]); 26] = [
     ("engaged_in_motion", &[]),
     ("estop", &[]),
     ("hang", &[]),
+    ("hang_in_bring_up", &[]),
     ("late", &[]),
     ("link", &[]),
     ("modes", &[]),
+    ("modes_in_motion", &[]),
     ("one_stops", &[]),
     ("one_way", &[]),
     ("parked_in_contact", &[]),
@@ -126,6 +128,11 @@ fn hang() {
 }
 
 #[test]
+fn hang_in_bring_up() {
+    run("hang_in_bring_up");
+}
+
+#[test]
 fn late() {
     run("late");
 }
@@ -138,6 +145,11 @@ fn link() {
 #[test]
 fn modes() {
     run("modes");
+}
+
+#[test]
+fn modes_in_motion() {
+    run("modes_in_motion");
 }
 
 #[test]

@@ -18,7 +18,7 @@ pub struct DynamicsParameters {
     pub force_gain: Vector3<f64>,
     /// Share of gravity that is compensated.
     pub gravity_gain: f64,
-    /// Share of Coulomb friction that is compensated.
+    /// Share of Coulomb friction that is compensated, where the joint turns and where the wanted force pulls it.
     pub friction_comp: f64,
     /// Pull to the nominal posture where it does not move the tool, in N m/rad.
     pub posture_stiffness: f64,
@@ -70,6 +70,9 @@ const COUNTER_SPEED: f64 = 0.01;
 /// How the recentring sets out once the base yields, in m/s²: a base that went off at once for what is centimetres off would drive
 /// the arm's joints faster than a push does, with nobody touching anything.
 const SETTING_OUT: f64 = 0.4;
+/// How fast the joints may have to turn for a base that goes faster than the tool, in rad/s: the wrist, which is light and has a
+/// long lever, makes up for most of it.
+const LEFT_BEHIND: f64 = 0.3;
 /// Joint speed by which the counter-motion may be wrong before all of the friction compensation corrects it, in rad/s.
 const COUNTER_SLOPE: f64 = 0.03;
 
@@ -82,6 +85,8 @@ pub struct Dynamics {
     pub parameters: DynamicsParameters,
     /// Torque of the coupling (force and posture), in N m: whoever stops asking for it suddenly, it goes along a ramp.
     coupling: J5,
+    /// Torque of the wanted force alone, in N m, along the same ramp: what the friction compensation looks at where a joint sticks.
+    pull: J5,
     /// How far the base yields because the other one does, 0 to 1.
     mutual: f64,
     /// For how long the base has yielded, in s.
@@ -139,59 +144,80 @@ impl ToolSpace {
         let mobility = arm * mass.solve(&arm.transpose()) + Matrix3::identity() * SINGULARITY_DAMPING;
         Some(Self { arm: *arm, mass, inertia: mobility.cholesky()? })
     }
+
+    /// Joint speeds with which a force on the tool would make it move with `speed` (m/s, in the world).
+    fn joints(&self, speed: &Vector3<f64>) -> J5 {
+        self.mass.solve(&self.arm.tr_mul(&self.inertia.solve(speed)))
+    }
+
+    /// The share of a motion of the base that the joints make up for, where the tool, which would be carried along with
+    /// `carried`, goes with `speed` (both in m/s, in the world). A base that went faster, whether it is after the tool or gives way
+    /// to a force, would turn the joints as a push does, which is an overspeed.
+    fn share_followed(&self, carried: &Vector3<f64>, speed: &Vector3<f64>) -> f64 {
+        let Some(ahead) = carried.try_normalize(f64::EPSILON) else { return 1.0 };
+        let most = speed.dot(&ahead).max(0.0) + LEFT_BEHIND / self.joints(&ahead).amax();
+        (most / carried.norm()).min(1.0)
+    }
 }
 
 impl Dynamics {
     /// A law for an arm.
     pub fn new(model: ArmModel) -> Self {
-        Self { model, parameters: DynamicsParameters::default(), coupling: J5::zeros(), mutual: 0.0, yielding: 0.0 }
+        let (coupling, pull) = (J5::zeros(), J5::zeros());
+        Self { model, parameters: DynamicsParameters::default(), coupling, pull, mutual: 0.0, yielding: 0.0 }
     }
 
-    /// One step of `dt` seconds. `coupled`: what the coupling wants; none: nothing, or it is not known any more, and only
-    /// gravity and friction are compensated.
+    /// One step of `dt` seconds. `moves`: how the base does, in its frame. `coupled`: what the coupling wants; none: nothing, or
+    /// it is not known any more, and only gravity and friction are compensated.
     pub fn update(
         &mut self,
         q: &J5,
         qd: &J5,
         jacobian: &Jacobian8,
+        moves: Twist2,
         coupled: Option<&Coupled>,
         dt: f64,
     ) -> DynamicsOutput {
         let p = &self.parameters;
         let at = self.model.posture(q);
+        let mutual = coupled.is_some_and(|coupled| coupled.peer_yields);
         let mut torque = self.model.gravity(&at) * p.gravity_gain + soft_limits(q, p.soft_limit_k);
+        let most = TORQUE_SLEW * dt;
+        let arm: Jacobian = jacobian.fixed_columns::<JOINTS>(3).into_owned();
+        let coupled = coupled.filter(|coupled| coupled.engaged > 0.0);
+        let pull = coupled.map_or_else(J5::zeros, |coupled| arm.tr_mul(&coupled.force));
+        self.pull += (pull - self.pull).map(|step| step.clamp(-most, most));
         for i in 0..JOINTS {
-            torque[i] += p.friction_comp * COULOMB[i] * (qd[i] / FRICTION_SLOPE).tanh();
+            // Who is pulled is helped out of sticking, too, by what the pull is beside the joint's friction. That puts no energy into
+            // the arm, whatever the delay: the compensation never is more than the friction that takes it.
+            let along = qd[i] / FRICTION_SLOPE + self.pull[i] / COULOMB[i];
+            torque[i] += p.friction_comp * COULOMB[i] * along.tanh();
         }
         let (mut twist, mut coupling) = (Twist2::default(), J5::zeros());
-        let mutual = coupled.is_some_and(|coupled| coupled.peer_yields);
         self.mutual = (self.mutual + if mutual { dt / ENGAGE } else { -dt / FADE }).clamp(0.0, 1.0);
-        let yields = p.yields() && self.mutual > 0.0 && coupled.is_some_and(|coupled| coupled.engaged > 0.0);
+        let yields = p.yields() && self.mutual > 0.0 && coupled.is_some();
         self.yielding = if yields { self.yielding + dt } else { 0.0 };
-        if let Some(Coupled { force, engaged, .. }) = coupled.filter(|coupled| coupled.engaged > 0.0) {
-            let arm: Jacobian = jacobian.fixed_columns::<JOINTS>(3).into_owned();
-            coupling = arm.tr_mul(force);
+        if let Some(Coupled { force, engaged, .. }) = coupled {
+            coupling = pull;
             let tool = ToolSpace::of(&self.model, &at, &arm);
             if let Some(tool) = &tool {
                 coupling += self.posture_torque(tool, q, qd) * *engaged;
             }
             if yields {
-                let base = jacobian.fixed_columns::<3>(0);
+                let base = jacobian.fixed_columns::<3>(0).into_owned();
                 let wrench = base.tr_mul(force) * self.mutual;
                 let off = Vector3::new(at.tool.x - p.r_nominal[0], at.tool.y - p.r_nominal[1], 0.0);
                 let home = off * (p.recenter_gain * engaged * self.mutual);
                 let home = home.cap_magnitude(SETTING_OUT * self.yielding);
-                twist = Twist2 {
-                    vx: p.force_gain.x * wrench.x + home.x,
-                    vy: p.force_gain.y * wrench.y + home.y,
-                    wz: p.force_gain.z * wrench.z,
-                };
+                let mut wanted = p.force_gain.component_mul(&wrench) + home;
                 if let Some(tool) = &tool {
+                    let speed = arm * qd + base * Vector3::new(moves.vx, moves.vy, moves.wz);
+                    wanted *= tool.share_followed(&(base * wanted), &speed);
                     coupling += self.counter_torque(tool, &(base * home), qd) * *engaged;
                 }
+                twist = Twist2 { vx: wanted.x, vy: wanted.y, wz: wanted.z };
             }
         }
-        let most = TORQUE_SLEW * dt;
         self.coupling += (coupling - self.coupling).map(|step| step.clamp(-most, most));
         torque += self.coupling;
         let mut saturated = 0;
@@ -216,15 +242,16 @@ impl Dynamics {
     /// carries the tool along, the base never gets there, and drives on with nobody touching anything. It is friction
     /// compensation, about the joint speeds that leave the tool where it is.
     fn counter_torque(&self, tool: &ToolSpace, home: &Vector3<f64>, qd: &J5) -> J5 {
-        let speeds = -tool.mass.solve(&tool.arm.tr_mul(&tool.inertia.solve(home)));
+        let speeds = -tool.joints(home);
         let share = self.parameters.friction_comp * (home.norm() / COUNTER_SPEED).min(1.0);
         J5::from_fn(|i, _| share * COULOMB[i] * ((speeds[i] - qd[i]) / COUNTER_SLOPE).tanh())
     }
 
     /// Forgets the past.
     pub fn reset(&mut self) {
-        self.coupling = J5::zeros();
+        (self.coupling, self.pull) = (J5::zeros(), J5::zeros());
         self.mutual = 0.0;
+        self.yielding = 0.0;
     }
 }
 
@@ -267,6 +294,8 @@ mod tests {
     use super::super::kinematics::Tool;
     use super::*;
 
+    const STANDS: Twist2 = Twist2 { vx: 0.0, vy: 0.0, wz: 0.0 };
+
     #[test]
     fn the_posture_does_not_push_the_tool() {
         let model = ArmModel::youbot(0.219, 1.0);
@@ -289,14 +318,15 @@ mod tests {
         let tool = Tool::of(&model, &q, &J5::zeros(), Default::default(), Default::default());
         let pull = Coupled { force: Vector3::new(2.0, 0.0, 0.0), engaged: 1.0, peer_yields: true };
         for coupled in [None, Some(Coupled { engaged: 0.0, ..pull })] {
-            let out = law.update(&q, &J5::zeros(), &tool.jacobian, coupled.as_ref(), 0.001);
+            let out = law.update(&q, &J5::zeros(), &tool.jacobian, STANDS, coupled.as_ref(), 0.001);
             assert_eq!(out.torque, model.gravity(&model.posture(&q)));
             assert_eq!(out.twist, Twist2::default());
         }
         law.parameters.r_nominal = [at_tool(&model, &q).x, at_tool(&model, &q).y];
+        let along = Twist2 { vx: 0.3, ..STANDS };
         let mut moves = |peer_yields: bool| {
             let pull = Coupled { peer_yields, ..pull };
-            let update = |_| law.update(&q, &J5::zeros(), &tool.jacobian, Some(&pull), 0.001).twist;
+            let update = |_| law.update(&q, &J5::zeros(), &tool.jacobian, along, Some(&pull), 0.001).twist;
             (0..301).map(update).last().expect("updates")
         };
         assert_eq!(moves(false), Twist2::default(), "the other base stands");
@@ -311,23 +341,59 @@ mod tests {
         law.parameters.force_gain = Vector3::new(0.1, 0.1, 0.1);
         let q = radians([0.0, -50.0, -70.0, -60.0, 0.0]);
         let off = at_tool(&model, &q) - Vector3::new(law.parameters.r_nominal[0], law.parameters.r_nominal[1], 0.0);
-        let off = off.xy().norm();
-        assert!(off > 0.03, "{off}");
+        let off = off.xy();
+        assert!(off.norm() > 0.03, "{off}");
         let tool = Tool::of(&model, &q, &J5::zeros(), Default::default(), Default::default());
         let rest = Coupled { force: Vector3::zeros(), engaged: 1.0, peer_yields: true };
+        // The tool goes ahead of it.
+        let ahead = Twist2 { vx: off.x * 20.0, vy: off.y * 20.0, wz: 0.0 };
         let mut last = 0.0;
         for tick in 1..=6000 {
-            let twist = law.update(&q, &J5::zeros(), &tool.jacobian, Some(&rest), 0.001).twist;
+            let twist = law.update(&q, &J5::zeros(), &tool.jacobian, ahead, Some(&rest), 0.001).twist;
             let speed = twist.vx.hypot(twist.vy);
             let most = SETTING_OUT * f64::from(tick) * 0.001;
             assert!(speed <= most + 1e-9 && speed >= last - 1e-9, "{speed} after {tick} ms");
             last = speed;
         }
-        assert!((last - law.parameters.recenter_gain * off).abs() < 1e-6, "in the end all of it: {last}");
+        assert!((last - law.parameters.recenter_gain * off.norm()).abs() < 1e-6, "in the end all of it: {last}");
         // Once more from where it is.
-        law.update(&q, &J5::zeros(), &tool.jacobian, None, 1.0);
-        let again = law.update(&q, &J5::zeros(), &tool.jacobian, Some(&rest), 0.001).twist;
+        law.update(&q, &J5::zeros(), &tool.jacobian, ahead, None, 1.0);
+        let again = law.update(&q, &J5::zeros(), &tool.jacobian, ahead, Some(&rest), 0.001).twist;
         assert!(again.vx.hypot(again.vy) < 1e-3, "{again:?}");
+    }
+
+    #[test]
+    fn the_base_is_never_faster_than_the_joints_can_make_up_for() {
+        let model = ArmModel::youbot(0.219, 1.0);
+        let mut law = Dynamics::new(model.clone());
+        law.parameters.force_gain = Vector3::new(0.1, 0.1, 0.1);
+        // Arms as five degrees of freedom leave them, and forces as before it lets go.
+        let cases = [
+            ([0.0, -44.0, 100.0, 74.0, 0.0], [-1.0, 0.0, 0.5]),
+            ([20.0, -30.0, 100.0, 60.0, 0.0], [4.0, -4.0, 0.0]),
+            ([-30.0, 10.0, 80.0, 70.0, 10.0], [0.0, 8.0, -2.0]),
+        ];
+        for (q, force) in cases {
+            let q = radians(q);
+            let tool = Tool::of(&model, &q, &J5::zeros(), Default::default(), Default::default());
+            let base = tool.jacobian.fixed_columns::<3>(0).into_owned();
+            let space =
+                ToolSpace::of(&model, &model.posture(&q), &tool.jacobian.fixed_columns::<JOINTS>(3).into_owned())
+                    .unwrap();
+            let pull = Coupled { force: Vector3::from(force), engaged: 1.0, peer_yields: true };
+            let mut after = |moves: Twist2| {
+                law.reset();
+                let update = |_| law.update(&q, &J5::zeros(), &tool.jacobian, moves, Some(&pull), 0.001).twist;
+                (0..2000).map(update).last().expect("updates")
+            };
+            let asked = |wanted: Twist2| space.joints(&(base * Vector3::new(wanted.vx, wanted.vy, wanted.wz))).amax();
+            let stands = after(STANDS);
+            assert!((asked(stands) - LEFT_BEHIND).abs() < 1e-3, "{stands:?} asks for {} rad/s", asked(stands));
+            // Carried along it may be as fast as it was meant to be, and in the same direction.
+            let carried = after(Twist2 { vx: stands.vx * 20.0, vy: stands.vy * 20.0, wz: stands.wz * 20.0 });
+            assert!(asked(carried) > 1.5 * LEFT_BEHIND, "{carried:?}");
+            assert!((carried.vx * stands.vy - carried.vy * stands.vx).abs() < 1e-9);
+        }
     }
 
     fn at_tool(model: &ArmModel, q: &J5) -> Vector3<f64> {
@@ -345,12 +411,43 @@ mod tests {
         let (mut last, mut most) = (alone, 0.0_f64);
         for tick in 0..400 {
             let coupled = (tick < 200).then_some(&pull);
-            let out = law.update(&q, &J5::zeros(), &tool.jacobian, coupled, 0.001);
-            assert!((out.torque - last).amax() <= 0.2 + 1e-9);
+            let out = law.update(&q, &J5::zeros(), &tool.jacobian, STANDS, coupled, 0.001);
+            // The force's own, and the friction compensation's for its sake.
+            let bound = 0.2 * (1.0 + law.parameters.friction_comp);
+            assert!((out.torque - last).amax() <= bound + 1e-9, "{last} {}", out.torque);
             last = out.torque;
             most = most.max((last - alone).amax());
         }
         assert!(most > 1.5 && last == alone, "{most} {last}");
+    }
+
+    #[test]
+    fn who_is_pulled_is_helped_out_of_sticking_by_less_than_the_friction() {
+        let model = ArmModel::youbot(0.219, 1.0);
+        let q = radians([0.0, -30.0, 100.0, 60.0, 0.0]);
+        let tool = Tool::of(&model, &q, &J5::zeros(), Default::default(), Default::default());
+        let arm: Jacobian = tool.jacobian.fixed_columns::<JOINTS>(3).into_owned();
+        let carried = model.gravity(&model.posture(&q)) + soft_limits(&q, 80.0);
+        for (force, qd) in [(1.0, 0.0), (8.0, 0.0), (8.0, 1.0), (8.0, -1.0), (-8.0, 0.02)] {
+            let (pull, qd) = (Vector3::new(force, -0.5 * force, 0.3 * force), J5::repeat(qd));
+            let mut law = Dynamics::new(model.clone());
+            (law.parameters.posture_stiffness, law.parameters.posture_damping) = (0.0, 0.0);
+            let coupled = Coupled { force: pull, engaged: 1.0, peer_yields: true };
+            let update = |_| law.update(&q, &qd, &tool.jacobian, STANDS, Some(&coupled), 0.001).torque;
+            let torque = (0..200).map(update).last().expect("updates");
+            let (own, share) = (arm.tr_mul(&pull), law.parameters.friction_comp);
+            let help = torque - carried - own;
+            for i in 0..JOINTS {
+                assert!(help[i].abs() <= share * COULOMB[i] + 1e-9, "{help}");
+                if qd[i] == 0.0 {
+                    let most = share * COULOMB[i];
+                    assert!(
+                        (help[i] - most * (own[i] / COULOMB[i]).tanh()).abs() < 1e-9,
+                        "along the pull: {help} {own}"
+                    );
+                }
+            }
+        }
     }
 
     #[test]

@@ -68,6 +68,7 @@ impl Robot {
             &self.body.arm.q,
             &self.body.arm.qd,
             &self.tool.jacobian,
+            self.body.base.twist,
             Some(&coupled),
             CONTROL_PERIOD,
         );

@@ -3,7 +3,7 @@
 
 use super::Inner;
 use super::steps::closed;
-use crate::model::{ComponentName, Injection, RunState, Value};
+use crate::model::{ComponentName, Ident, Injection, RunState, Value};
 use crate::runtime::activity::OperationJob;
 use crate::runtime::call::{CallProgress, Reply, Responder};
 use crate::runtime::cell::{Cell, CellGuard, CellRequest};
@@ -19,11 +19,12 @@ impl Inner {
             let registry = lock(&self.registry);
             let slot = registry.find(name).map_err(|cause| cause.to_string())?;
             let entry = registry.entry(slot);
-            if let Injection::Hang { operation: Some(operation) } = injection
+            if let Injection::Hang { operation: Some(operation) } | Injection::Stall { operation: Some(operation), .. } =
+                injection
                 && entry.caller(*operation).is_some()
             {
                 let beside = format!("`{operation}` runs beside `{name}`, in the thread of who calls it");
-                return Err(format!("{beside}: it cannot be made to hang"));
+                return Err(format!("{beside}: it cannot be held up"));
             }
             let cell = entry.cell.clone();
             let running = (cell.state() == RunState::Running).then(|| {
@@ -55,15 +56,17 @@ impl Inner {
 
 /// What is to be asked of the component; none: it was enough to set a trap.
 fn asked(cell: &Cell, injection: &Injection) -> Result<Option<CellRequest>, String> {
+    let trap = |operation: &Ident, time| {
+        let index = cell.kind.operations.binary_search(operation);
+        cell.trap(index.map_err(|_| format!("`{}` has no operation `{operation}`", cell.name))?, time);
+        Ok(None)
+    };
     Ok(Some(match injection {
         Injection::Hang { operation: None } => CellRequest::Hang,
         Injection::Panic => CellRequest::Panic,
-        Injection::Stall { time } => CellRequest::Stall(*time),
-        Injection::Hang { operation: Some(operation) } => {
-            let index = cell.kind.operations.binary_search(operation);
-            cell.trap(index.map_err(|_| format!("`{}` has no operation `{operation}`", cell.name))?);
-            return Ok(None);
-        }
+        Injection::Stall { time, operation: None } => CellRequest::Stall(*time),
+        Injection::Stall { time, operation: Some(operation) } => return trap(operation, Some(*time)),
+        Injection::Hang { operation: Some(operation) } => return trap(operation, None),
         Injection::Declared { name, values, .. } => {
             let declared = cell.kind.ty.injections.iter().enumerate().find(|(_, (known, _))| *known == name);
             let (index, (_, declared)) =

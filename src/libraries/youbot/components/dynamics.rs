@@ -92,7 +92,7 @@ impl Component for DynamicsComponent {
                 .tunable(Tunable::Stopped)
                 .property("payload", GRIPPER.mass),
             friction_comp: b
-                .doc("Share of Coulomb friction compensated; more than 1 makes the arm run away.")
+                .doc("Share of Coulomb friction compensated, along the motion and along the wanted force; more than 1 makes the arm run away.")
                 .range(0.0..=1.0)
                 .property("friction_comp", p.friction_comp),
             posture_stiffness: b
@@ -150,11 +150,12 @@ impl Component for DynamicsComponent {
         let coupled = force.zip(engaged).map(|((force, _), (engaged, _))| Coupled { force, engaged, peer_yields });
         let jacobian = jacobian.map_or_else(Jacobian8::zeros, |(flat, _)| Jacobian8::from_column_slice(&flat));
         let (q, qd) = (J5::from(joints.pos), J5::from(joints.vel));
-        let out = self.law.update(&q, &qd, &jacobian, coupled.as_ref(), going_on(cx));
-        self.effort.write(out.torque);
         // The base moves only while it is known how it moves.
-        let known = self.odometry.sample().is_some_and(|o| seconds_since(cx.now(), o.at) <= STALE);
-        self.base_twist.write(if known { out.twist.into() } else { Twist::default() });
+        let moves =
+            self.odometry.sample().filter(|o| seconds_since(cx.now(), o.at) <= STALE).map(|o| o.value.split().1);
+        let out = self.law.update(&q, &qd, &jacobian, moves.unwrap_or_default(), coupled.as_ref(), going_on(cx));
+        self.effort.write(out.torque);
+        self.base_twist.write(if moves.is_some() { out.twist.into() } else { Twist::default() });
         self.tau_sat.write(out.saturated);
         self.yields.write(self.law.parameters.yields());
     }
