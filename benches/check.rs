@@ -8,64 +8,34 @@
 mod family;
 #[path = "../tests/support/flat.rs"]
 mod flat;
+#[path = "../tests/support/in_use.rs"]
+mod in_use;
 
 use davit::app;
 use davit::check::run;
 use davit::lang::LoadOptions;
 use davit::libraries;
-use std::alloc::{GlobalAlloc, Layout};
+use in_use::InUse;
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
-/// The program's allocator, and how much of it is in use at most.
-struct Peak;
-
-static IN_USE: AtomicUsize = AtomicUsize::new(0);
-static PEAK: AtomicUsize = AtomicUsize::new(0);
-/// Counting costs a tenth of what is measured: memory is measured in a run of its own.
-static COUNTS: AtomicBool = AtomicBool::new(false);
-
-// SAFETY: everything is handed on to the program's allocator as it came.
-unsafe impl GlobalAlloc for Peak {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        if COUNTS.load(Ordering::Relaxed) {
-            let now = IN_USE.fetch_add(layout.size(), Ordering::Relaxed) + layout.size();
-            PEAK.fetch_max(now, Ordering::Relaxed);
-        }
-        // SAFETY: as for whoever called this.
-        unsafe { mimalloc::MiMalloc.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, at: *mut u8, layout: Layout) {
-        if COUNTS.load(Ordering::Relaxed) {
-            // What was made before it began to count is not in it.
-            let _ = IN_USE
-                .fetch_update(Ordering::Relaxed, Ordering::Relaxed, |now| Some(now.saturating_sub(layout.size())));
-        }
-        // SAFETY: as for whoever called this.
-        unsafe { mimalloc::MiMalloc.dealloc(at, layout) }
-    }
-}
-
 #[global_allocator]
-static ALLOCATOR: Peak = Peak;
+static ALLOCATOR: InUse<mimalloc::MiMalloc> = InUse(mimalloc::MiMalloc);
 
 #[allow(clippy::disallowed_methods)] // a benchmark measures real time
 fn row(name: &str, file: &Path) {
     let mut best: Option<(Duration, usize, usize, bool)> = None;
     let mut memory = 0;
     for run_number in 0..6 {
-        COUNTS.store(run_number == 0, Ordering::Relaxed);
+        in_use::count(run_number == 0);
         let libraries = libraries::builtin();
         let read = app::read(file, &LoadOptions::default(), libraries).unwrap_or_else(|_| panic!("{name} is not read"));
-        let before = IN_USE.load(Ordering::Relaxed);
-        PEAK.store(before, Ordering::Relaxed);
+        let before = in_use::now();
         let start = Instant::now();
         let report = run(read.deployment, &read.catalogue);
         let took = start.elapsed();
         if run_number == 0 {
-            memory = PEAK.load(Ordering::Relaxed) - before;
+            memory = in_use::most() - before;
             continue;
         }
         let ends = !report.left.iter().any(|left| left.contains("--budget"));

@@ -2,19 +2,19 @@
 //!
 //! `cargo bench --bench plan`
 
+#[path = "../tests/support/names.rs"]
+mod names;
+
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use davit::model::*;
 use davit::plan::{PlanContext, plan};
 use davit::stack::{Op, Requester, ResolvedStep, Stack, Switch, transaction};
 use davit::system::{System, step};
 use davit::time::Time;
+use names::ident;
 use std::collections::BTreeMap;
 use std::hint::black_box;
 use std::sync::Arc;
-
-fn ident(text: &str) -> Ident {
-    Ident::new(text).expect("a name")
-}
 
 fn catalogue() -> Arc<Catalogue> {
     let mut ty = ComponentType::new("bench.Gain", "one in, one out, three properties");

@@ -7,36 +7,26 @@
 // What is measured here is real time.
 #![allow(clippy::disallowed_methods)]
 
+#[path = "../tests/support/in_use.rs"]
+mod in_use;
+#[path = "../tests/support/names.rs"]
+mod names;
+
 use davit::libraries::standard;
 use davit::model::*;
 use davit::platform::embedded::EmbeddedPlatform;
 use davit::platform::{Outcome, Platform, Prepared};
 use davit::runtime::*;
 use davit::time::{Clock, Time};
-use std::alloc::{GlobalAlloc, Layout, System};
+use in_use::InUse;
+use names::ident;
+use std::alloc::System;
 use std::collections::BTreeMap;
 use std::hint::black_box;
-use std::sync::atomic::{AtomicI64, Ordering};
 use std::time::{Duration, Instant};
 
-struct Counting;
-
-static LIVE: AtomicI64 = AtomicI64::new(0);
-
-// SAFETY: everything is the system allocator's; the count is beside it.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        LIVE.fetch_add(layout.size() as i64, Ordering::Relaxed);
-        unsafe { System.alloc(layout) }
-    }
-    unsafe fn dealloc(&self, at: *mut u8, layout: Layout) {
-        LIVE.fetch_sub(layout.size() as i64, Ordering::Relaxed);
-        unsafe { System.dealloc(at, layout) }
-    }
-}
-
 #[global_allocator]
-static COUNTING: Counting = Counting;
+static ALLOCATOR: InUse<System> = InUse(System);
 
 /// Connected to itself: an operation writes and reads many times and answers the nanoseconds of one write and one read.
 struct Mirror {
@@ -108,10 +98,6 @@ fn platform(clock: &Clock, period: Duration) -> EmbeddedPlatform {
         .with(Library::new("bench").with::<Mirror>("Mirror").with::<Controlled>("Controlled"));
     let activity = Activity { period: Some(period), priority: 0, cpu: None, origin: Origin::NONE };
     EmbeddedPlatform::new(clock, &libraries, &BTreeMap::from([(ident("bench"), activity)]))
-}
-
-fn ident(text: &str) -> Ident {
-    Ident::new(text).unwrap()
 }
 
 fn done(platform: &EmbeddedPlatform, step: &Step) -> Option<Value> {
@@ -191,13 +177,13 @@ fn bring_up() {
             || {
                 let clock = Clock::real();
                 let platform = platform(&clock, Duration::from_secs(1000));
-                let before = LIVE.load(Ordering::Relaxed);
+                let before = in_use::now();
                 let start = Instant::now();
                 for step in &up {
                     done(&platform, step);
                 }
                 let took = start.elapsed().as_nanos() as f64;
-                bytes = (LIVE.load(Ordering::Relaxed) - before) / n as i64;
+                bytes = (in_use::now() - before) / n;
                 let start = Instant::now();
                 for step in &down {
                     done(&platform, step);
@@ -283,6 +269,7 @@ fn round() {
 }
 
 fn main() {
+    in_use::count(true);
     ports();
     bring_up();
     switch();

@@ -1,6 +1,7 @@
 //! `davit explain CODE|KEY`
 
 use super::exit::Exit;
+use super::flags::{self, Flag};
 use super::output::{Output, Style, Table, text_columns, wrapped};
 use super::{CommandContext, CommandFailure, CommandResult, Run};
 use crate::lang::schema::{self, ReferenceEntry};
@@ -9,7 +10,7 @@ use crate::model::finding::did_you_mean;
 use serde::Serialize;
 
 /// Explain a finding (what happened, why it is refused, what to do), or a key of the files (what it means, its form, its unit, its
-/// bounds, what holds without it, how it is written).
+/// bounds, what holds without it, how it is written). Behind `--` also a flag: `davit explain -- --set`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The finding's code, as `conf::unknown_component` or `davit::conf::unknown_component`; a key, as `timeout` or
@@ -93,6 +94,9 @@ fn one(out: &Output, what: &str, json: bool) -> Result<(), CommandFailure> {
         }
         return Ok(());
     }
+    if what.starts_with('-') {
+        return flag(out, what, json);
+    }
     let entries = schema::about(what);
     if entries.is_empty() {
         return Err(unknown(what));
@@ -108,6 +112,41 @@ fn one(out: &Output, what: &str, json: bool) -> Result<(), CommandFailure> {
         out.text(shown(out, entry));
     }
     Ok(())
+}
+
+/// A flag: which commands have it, and what it means there.
+fn flag(out: &Output, what: &str, json: bool) -> Result<(), CommandFailure> {
+    let flags = flags::about(what);
+    if flags.is_empty() {
+        let message = format!("no command has a flag `{what}`");
+        let known = flags::names();
+        let help = did_you_mean(what, "flags", known.iter().map(String::as_str));
+        return Err(CommandFailure::no(CLI_UNKNOWN_CODE, message, help));
+    }
+    if json {
+        out.json(&flags);
+        return Ok(());
+    }
+    for (at, flag) in flags.iter().enumerate() {
+        if at > 0 {
+            out.line("");
+        }
+        out.text(shown_flag(out, flag));
+    }
+    Ok(())
+}
+
+fn shown_flag(out: &Output, flag: &Flag) -> String {
+    let mut text = format!("{}\n{}", out.paint(Style::Name, &flag.name), wrapped(&flag.doc, text_columns(), 2));
+    let of: Vec<String> = flag.of.iter().map(|command| format!("davit {command}")).collect();
+    let see: Vec<String> = flag.see.iter().map(|key| format!("davit explain {key}")).collect();
+    for (name, list) in [("of", of), ("see", see)] {
+        if !list.is_empty() {
+            let list = wrapped(&list.join(", "), text_columns(), 12);
+            text.push_str(&format!("  {:10}{}\n", format!("{name}:"), list.trim()));
+        }
+    }
+    text
 }
 
 fn unknown(what: &str) -> CommandFailure {

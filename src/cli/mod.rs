@@ -15,6 +15,7 @@ mod drift;
 pub mod exit;
 mod explain;
 mod figures;
+mod flags;
 mod graph;
 pub mod input;
 mod inside;

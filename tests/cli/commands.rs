@@ -101,6 +101,22 @@ fn explain_tells_what_a_key_means() {
     assert!(keys.out.contains("deploy.within_s") && !keys.out.contains("durability"), "{}", keys.out);
 }
 
+/// A flag is told like a key, with the keys that are about it; one that no command has is not.
+#[test]
+fn flags_are_explained() {
+    let ran = at_home(&["explain", "--", "--set"]);
+    assert_eq!(ran.code, 0, "{}", ran.err);
+    for told in ["--set <NAME=VALUE>", "davit check", "davit deploy", "davit explain deployment.with"] {
+        assert!(ran.out.contains(told), "{told}: {}", ran.out);
+    }
+    let json = at_home(&["explain", "--json", "--", "--budget=2M"]).json();
+    assert_eq!(json[0]["of"], serde_json::json!(["check"]), "{json}");
+    assert!(json[0]["doc"].as_str().is_some_and(|doc| doc.contains("500Kstates")), "{json}");
+    let ran = at_home(&["explain", "--", "--bugdet"]);
+    assert!(ran.code == 1 && ran.err.contains("did you mean `--budget`?"), "{}", ran.err);
+    assert!(ran.err.contains("no command has a flag `--bugdet`"), "{}", ran.err);
+}
+
 #[test]
 fn schema_writes_what_editors_need() {
     let demo = Demo::new();
