@@ -7,6 +7,8 @@ use std::path::{Path, PathBuf};
 
 #[path = "house/changes.rs"]
 mod changes;
+#[path = "house/types.rs"]
+mod types;
 
 /// A file past this is a sign that a second idea lives in it.
 const LINES: usize = 500;
@@ -387,42 +389,6 @@ fn examples_name_no_rooms() {
         }
     }
     assert!(wrong.is_empty(), "rooms are private, use what `src/lib.rs` offers:\n{}", wrong.join("\n"));
-}
-
-/// Names of types, with the files in which each is: what a room calls so, for whoever reads it in the next one.
-fn type_names() -> BTreeMap<String, Vec<String>> {
-    let mut names: BTreeMap<String, Vec<String>> = BTreeMap::new();
-    for (file, text) in sources("src").into_iter().filter(|(file, _)| !file.contains("/tests")) {
-        // Types of tests, and those inside of functions, are seen by nobody else: they are indented.
-        for line in code_lines(&text) {
-            let line = line.strip_prefix("pub").map_or(line.as_str(), |rest| {
-                rest.strip_prefix('(').and_then(|rest| rest.split_once(')')).map_or(rest, |(_, rest)| rest).trim_start()
-            });
-            let mut words = line.split(|c: char| !c.is_alphanumeric() && c != '_');
-            let is_type = !line.starts_with(' ') && words.next().is_some_and(|word| TYPES.contains(&word));
-            if let Some(name) = words.next().filter(|_| is_type) {
-                names.entry(name.to_owned()).or_default().push(file.clone());
-            }
-        }
-    }
-    names
-}
-
-const TYPES: &[&str] = &["struct", "enum", "trait", "type", "union"];
-
-/// Names that several types may have: each a file's own, in the same place of its room.
-const MANY: &[(&str, &str)] = &[("Args", "what a command line may say: one of each command, and seen by no other")];
-
-/// One name, one type: who reads it in an error or finds it by searching knows what it is.
-#[test]
-fn one_name_is_one_type() {
-    let names = type_names();
-    assert!(names.len() > 500, "the sources were not understood: {} types", names.len());
-    let several: Vec<String> = (names.iter())
-        .filter(|(name, files)| files.len() > 1 && MANY.iter().all(|(many, _)| many != name))
-        .map(|(name, files)| format!("`{name}` is in {}: give the newest a name of its own", files.join(", ")))
-        .collect();
-    assert!(several.is_empty(), "names of several types:\n{}", several.join("\n"));
 }
 
 #[test]

@@ -42,7 +42,7 @@ impl Product<'_> {
     fn first_of(&self, number: usize, came: &[(usize, EventId)]) -> Takes {
         let precedence = |event: EventId| {
             let name = self.members[number].name_of(event);
-            name.map_or(Precedence::InTurn, |name| self.deployment.precedence(name))
+            name.map_or(Precedence::Queued, |name| self.deployment.precedence(name))
         };
         let told: SmallVec<[(EventId, Precedence); 4]> =
             came.iter().map(|(_, event)| (*event, precedence(*event))).collect();
@@ -52,7 +52,7 @@ impl Product<'_> {
     }
 
     /// Whether a coordinator has taken what it takes if all had come before: nobody could tell how much had, else.
-    pub(super) fn takes_in_turn(
+    pub(super) fn takes_in_order(
         &self,
         before: &ProductState,
         after: &ProductState,

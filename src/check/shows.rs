@@ -98,7 +98,7 @@ impl Shows {
         let races = || goes_on && races(before, next);
         match next.by {
             // How much has come is seen by nobody: in a script all has.
-            Move::Taken(number, event) => product.takes_in_turn(before, &next.state, usize::from(number), event),
+            Move::Taken(number, event) => product.takes_in_order(before, &next.state, usize::from(number), event),
             Move::Answer => {
                 let own_time = (self.unhandled || self.at_once) && !self.answers_idle(before, next);
                 // What is taken back unconfirmed may have to wait for what is under way.

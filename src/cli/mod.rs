@@ -77,17 +77,17 @@ struct Cli {
     #[arg(long, global = true, value_enum, default_value_t, value_name = "WHEN")]
     color: Color,
     #[command(subcommand)]
-    command: Command,
+    command: Subcommand,
 }
 
 macro_rules! commands {
     ($($variant:ident = $args:path,)*) => {
         #[derive(Debug, clap::Subcommand)]
-        enum Command {
+        enum Subcommand {
             $($variant($args),)*
         }
 
-        impl Command {
+        impl Subcommand {
             fn run(self, context: &CommandContext) -> CommandResult {
                 match self {
                     $(Self::$variant(args) => args.run(context),)*
@@ -232,7 +232,7 @@ fn run(extensions: Extensions) -> ExitCode {
     };
     let context = CommandContext { out: Output::new(cli.color), extensions };
     // They keep a robot up: nothing that cannot be written may hold them.
-    if matches!(cli.command, Command::Deploy(_) | Command::Run(_))
+    if matches!(cli.command, Subcommand::Deploy(_) | Subcommand::Run(_))
         && let Err(error) = last_words::prepare()
     {
         return tell(context.out, deploy::short(error), FailureAnswer::Text).into();
@@ -240,9 +240,11 @@ fn run(extensions: Extensions) -> ExitCode {
     let answers = match &cli.command {
         _ if !json => FailureAnswer::Text,
         // Their help promises one object a line.
-        Command::Deploy(_) | Command::Run(_) | Command::Sim(_) | Command::Monitor(_) => FailureAnswer::JsonLine,
-        Command::Watch(_) => FailureAnswer::JsonLine,
-        Command::Log(log) if log.streams() => FailureAnswer::JsonLine,
+        Subcommand::Deploy(_) | Subcommand::Run(_) | Subcommand::Sim(_) | Subcommand::Monitor(_) => {
+            FailureAnswer::JsonLine
+        }
+        Subcommand::Watch(_) => FailureAnswer::JsonLine,
+        Subcommand::Log(log) if log.streams() => FailureAnswer::JsonLine,
         _ => FailureAnswer::Json,
     };
     let ran = catch_unwind(AssertUnwindSafe(|| cli.command.run(&context)));

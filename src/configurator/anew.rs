@@ -1,7 +1,7 @@
 //! After a panic of the configurator's own thread (semantics: *What goes wrong*): it begins anew. What was under way ends
 //! *broken*, with a partial frame of what was done of it; what is safe goes on, and what that has interrupted goes back.
 
-use super::control::InTurn;
+use super::control::QueuedCommand;
 use super::engine::Engine;
 use super::pool::Pool;
 use super::progress::Progress;
@@ -48,7 +48,7 @@ impl Engine {
     /// an operator wants recovered has left behind how far it came, and goes on when it is asked for once more.
     fn command_again(&mut self, reason: Reason, again: bool) {
         match self.doing.take() {
-            Some(InTurn::Recover { reply, .. }) => _ = reply.try_send(Err(Arc::new(Residual::of(reason)))),
+            Some(QueuedCommand::Recover { reply, .. }) => _ = reply.try_send(Err(Arc::new(Residual::of(reason)))),
             Some(command) if !again => {
                 self.counts.command_again(command.only_asks());
                 self.commands.push_front(command);
@@ -139,7 +139,7 @@ impl Engine {
     pub(super) fn abandoned(&mut self, mut machine: Transaction, since: crate::stack::FrameId) {
         let end = machine.end();
         // What force had begun it begins again, and leaves no frame of.
-        if matches!(self.doing, Some(InTurn::Force { .. })) {
+        if matches!(self.doing, Some(QueuedCommand::Force { .. })) {
             return;
         }
         for (part, ended) in machine.planned().parts.iter().zip(end.parts) {

@@ -161,7 +161,7 @@ words! {
 /// What somebody tells it, with where its answer goes.
 pub(super) enum ControlCommand {
     AtOnce(UrgentCommand),
-    InTurn(InTurn),
+    Queued(QueuedCommand),
 }
 
 /// Done where it is taken in.
@@ -188,7 +188,7 @@ pub(super) enum UrgentCommand {
 
 /// Waits until what is being done has an end, or gives way.
 #[derive(Clone)]
-pub(super) enum InTurn {
+pub(super) enum QueuedCommand {
     Drift { reply: Sender<Drift> },
     Recover { direction: Recovery, reply: Sender<Result<(), Arc<Residual>>> },
     TakeBack { deadline: Time, reply: Sender<TakenDown> },
@@ -203,9 +203,9 @@ impl From<UrgentCommand> for ControlCommand {
     }
 }
 
-impl From<InTurn> for ControlCommand {
-    fn from(command: InTurn) -> Self {
-        Self::InTurn(command)
+impl From<QueuedCommand> for ControlCommand {
+    fn from(command: QueuedCommand) -> Self {
+        Self::Queued(command)
     }
 }
 
@@ -216,7 +216,7 @@ impl UrgentCommand {
     }
 }
 
-impl InTurn {
+impl QueuedCommand {
     /// As [`UrgentCommand::only_asks`].
     pub fn only_asks(&self) -> bool {
         matches!(self, Self::Drift { .. } | Self::Recover { .. })

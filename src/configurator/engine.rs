@@ -2,7 +2,7 @@
 
 use super::conditions::{Conditions, Standings};
 use super::confirmations::Confirmations;
-use super::control::{ConfiguratorView, ControlCommand, InTurn, Moment, StoppingBegan, UrgentCommand};
+use super::control::{ConfiguratorView, ControlCommand, Moment, QueuedCommand, StoppingBegan, UrgentCommand};
 use super::inbox::{Counts, Mail};
 use super::looks::Observing;
 use super::pool::Pool;
@@ -72,7 +72,7 @@ pub(super) struct Engine {
     pub steps: u64,
     pub safety: Safety,
     /// Commands that wait.
-    pub commands: VecDeque<InTurn>,
+    pub commands: VecDeque<QueuedCommand>,
     pub suspects: Suspects,
     /// A component came back: what is broken may be mended.
     pub returned: bool,
@@ -102,7 +102,7 @@ pub(super) struct Engine {
     /// Panics since there was last nothing to be done.
     pub panics: usize,
     /// The command that is being carried out: a panic that takes it does not end it.
-    pub doing: Option<InTurn>,
+    pub doing: Option<QueuedCommand>,
     /// A listener has panicked when it was told an answer.
     pub listener: Option<Box<dyn Any + Send>>,
 }
@@ -161,7 +161,7 @@ impl Engine {
             }
             if let Some(command) = self.commands.pop_front() {
                 self.counts.command_taken(command.only_asks());
-                self.in_turn(command);
+                self.queued(command);
                 continue;
             }
             let mut did = self.serve_safe();
@@ -274,8 +274,8 @@ impl Engine {
                 self.counts.command_taken(command.only_asks());
                 self.at_once(command);
             }
-            // What waits for its turn keeps its place until then.
-            Mail::Command(ControlCommand::InTurn(command)) => self.commands.push_back(command),
+            // What is queued keeps its place until then.
+            Mail::Command(ControlCommand::Queued(command)) => self.commands.push_back(command),
         }
     }
 
@@ -353,7 +353,7 @@ impl Engine {
 
     /// Whether something waits that everything else gives way to.
     pub fn urgent(&self) -> bool {
-        self.counts.safe.load(Ordering::Acquire) > 0 || self.commands.iter().any(InTurn::is_urgent)
+        self.counts.safe.load(Ordering::Acquire) > 0 || self.commands.iter().any(QueuedCommand::is_urgent)
     }
 
     pub fn note_quarantine(&mut self) {

@@ -1,7 +1,7 @@
 //! Starting a configurator, and what others hold of it while its thread runs.
 
 use super::conditions::Conditions;
-use super::control::{ConfiguratorView, ControlCommand, Drift, InTurn, Recovery, TakenDown, UrgentCommand};
+use super::control::{ConfiguratorView, ControlCommand, Drift, QueuedCommand, Recovery, TakenDown, UrgentCommand};
 use super::engine::{Engine, Force, Given};
 use super::inbox::{self, Mail, Post};
 use super::pool::Pool;
@@ -128,7 +128,7 @@ struct HandleInner {
 
 impl Drop for HandleInner {
     fn drop(&mut self) {
-        self.post.command(InTurn::Stop);
+        self.post.command(QueuedCommand::Stop);
     }
 }
 
@@ -190,12 +190,12 @@ impl ConfiguratorHandle {
 
     /// The difference between the picture and the platform.
     pub fn drift(&self, deadline: Time) -> Option<Drift> {
-        self.ask(deadline, |reply| InTurn::Drift { reply })
+        self.ask(deadline, |reply| QueuedCommand::Drift { reply })
     }
 
     /// Recovers a broken system; the error is what remains. None: no answer by `deadline`.
     pub fn recover(&self, direction: Recovery, deadline: Time) -> Option<Result<(), Arc<Residual>>> {
-        self.ask(deadline, |reply| InTurn::Recover { direction, reply })
+        self.ask(deadline, |reply| QueuedCommand::Recover { direction, reply })
     }
 
     /// Takes in a configuration that an operator makes up, in the place of the one of that name, which must not be asked for
@@ -230,14 +230,14 @@ impl ConfiguratorHandle {
     /// The answer comes out of the receiver.
     pub fn take_back(&self, deadline: Time) -> Receiver<TakenDown> {
         let (reply, answer) = self.inner.clock.channel(1);
-        self.inner.post.command(InTurn::TakeBack { deadline, reply });
+        self.inner.post.command(QueuedCommand::TakeBack { deadline, reply });
         answer
     }
 
     /// The third stage: applies the `safe` configurations and what brings the system to rest, then removes everything.
     pub fn force_down(&self, deadline: Time) -> Receiver<TakenDown> {
         let (reply, answer) = self.inner.clock.channel(1);
-        self.inner.post.command(InTurn::Force { deadline, reply });
+        self.inner.post.command(QueuedCommand::Force { deadline, reply });
         answer
     }
 
@@ -259,13 +259,13 @@ impl ConfiguratorHandle {
 
     /// Forgets the stack: the *down* state was reached with an empty system.
     pub fn discard_stack(&self) {
-        self.inner.post.command(InTurn::DiscardStack);
+        self.inner.post.command(QueuedCommand::DiscardStack);
     }
 
     /// Ends the configurator: what is under way is broken off, what waits is answered *failed*. Waits until it has
     /// ended, at most until `deadline`; answers whether it has.
     pub fn stop(&self, deadline: Time) -> bool {
-        self.inner.post.command(InTurn::Stop);
+        self.inner.post.command(QueuedCommand::Stop);
         let thread = crate::time::lock(&self.inner.thread).take();
         thread.is_none_or(|thread| thread.join(deadline).is_ok())
     }

@@ -197,7 +197,7 @@ impl Post {
         let command = command.into();
         let asks = match &command {
             ControlCommand::AtOnce(command) => command.only_asks(),
-            ControlCommand::InTurn(command) => command.only_asks(),
+            ControlCommand::Queued(command) => command.only_asks(),
         };
         let (count, bound) = self.counts.room_of(asks);
         reserve(count, 1, bound) && self.sender.try_send(Mail::Command(command)).is_ok()
@@ -239,7 +239,7 @@ impl Post {
 
 #[cfg(test)]
 mod tests {
-    use super::super::control::InTurn;
+    use super::super::control::QueuedCommand;
     use super::*;
 
     /// An event that a configuration waits for is not among what looking at the platform tells.
@@ -263,12 +263,12 @@ mod tests {
     #[test]
     fn asking_takes_no_room_from_what_must_not_be_lost() {
         let (post, inbox) = new(&Clock::simulated());
-        let drift = || InTurn::Drift { reply: Clock::simulated().channel(1).0 };
+        let drift = || QueuedCommand::Drift { reply: Clock::simulated().channel(1).0 };
         let asked = (0..1_000).filter(|_| post.command(drift())).count();
         assert_eq!(asked, limits::CONFIGURATOR_COMMANDS);
         let told = (0..1_000).filter(|_| post.command(UrgentCommand::Stopping)).count();
         assert_eq!(told, limits::CONFIGURATOR_CONTROL);
-        let Ok(Mail::Command(ControlCommand::InTurn(command))) = inbox.try_recv() else { panic!("a command") };
+        let Ok(Mail::Command(ControlCommand::Queued(command))) = inbox.try_recv() else { panic!("a command") };
         assert!(!post.command(drift()), "it was taken in, and waits");
         post.counts.command_taken(command.only_asks());
         assert!(post.command(drift()));

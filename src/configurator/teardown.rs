@@ -1,6 +1,6 @@
 //! The third stage of stopping: by force, to nothing (semantics: *Stopping*).
 
-use super::control::{InTurn, TakenDown};
+use super::control::{QueuedCommand, TakenDown};
 use super::engine::{Engine, Force};
 use super::request::Reason;
 use super::running::{Purpose, Running};
@@ -15,31 +15,31 @@ use smallvec::SmallVec;
 use std::sync::Arc;
 
 impl Engine {
-    pub(super) fn in_turn(&mut self, command: InTurn) {
+    pub(super) fn queued(&mut self, command: QueuedCommand) {
         self.doing = Some(command.clone());
         match command {
-            InTurn::Drift { reply } => {
+            QueuedCommand::Drift { reply } => {
                 let drift = self.drift();
                 let _ = reply.try_send(drift);
             }
-            InTurn::Recover { direction, reply } => {
+            QueuedCommand::Recover { direction, reply } => {
                 let outcome = self.recover(direction);
                 let _ = reply.try_send(outcome);
             }
-            InTurn::TakeBack { deadline, reply } => {
+            QueuedCommand::TakeBack { deadline, reply } => {
                 let down = self.take_all_back(deadline);
                 let _ = reply.try_send(down);
             }
-            InTurn::Force { deadline, reply } => {
+            QueuedCommand::Force { deadline, reply } => {
                 let down = self.force(deadline);
                 let _ = reply.try_send(down);
             }
-            InTurn::DiscardStack => {
+            QueuedCommand::DiscardStack => {
                 self.world.stack.discard();
                 self.confirmations.clear();
                 self.changed();
             }
-            InTurn::Stop => self.stopping = true,
+            QueuedCommand::Stop => self.stopping = true,
         }
         self.doing = None;
     }

@@ -10,8 +10,8 @@ use smallvec::SmallVec;
 pub enum Precedence {
     /// What came first goes first.
     #[default]
-    InTurn,
-    /// Before those that go in turn; one that comes while it waits is the same.
+    Queued,
+    /// Before those that are queued; one that comes while it waits is the same.
     Urgent,
     /// The same, but it waits from then on where it came last: which of those that begin and end a deployment came last says
     /// where that is to go.
@@ -19,9 +19,9 @@ pub enum Precedence {
 }
 
 impl Precedence {
-    /// Whether it goes before those that go in turn.
+    /// Whether it goes before those that are queued.
     pub fn is_urgent(self) -> bool {
-        self != Self::InTurn
+        self != Self::Queued
     }
 }
 
@@ -29,7 +29,7 @@ impl Deployment {
     /// When a coordinator of it takes an event.
     pub fn precedence(&self, event: EventName) -> Precedence {
         match self.urgent().any(|urgent| urgent == event) {
-            false => Precedence::InTurn,
+            false => Precedence::Queued,
             true if [self.deploy.event, self.shutdown.event].contains(&event) => Precedence::UrgentAsLast,
             true => Precedence::Urgent,
         }

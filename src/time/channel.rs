@@ -3,8 +3,8 @@
 //! On the real clock they are crossbeam's; on a simulated one a receiver that waits gives the token away.
 
 use super::clock::{Clock, TimeKind};
+use super::schedule::WaitUntil;
 use super::simulated::Scheduler;
-use super::turns::WaitUntil;
 use super::{Time, lock};
 use crossbeam_channel as real;
 use std::collections::VecDeque;

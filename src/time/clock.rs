@@ -156,7 +156,7 @@ impl Clock {
         }
     }
 
-    /// Makes the calling thread a participant until the guard is dropped, waiting for its turn first. On the real clock,
+    /// Makes the calling thread a participant until the guard is dropped, waiting for the token first. On the real clock,
     /// and in a thread that is a participant already, it does nothing.
     #[must_use = "the thread is a participant while the guard lives"]
     pub fn enter(&self) -> Guard {

@@ -6,7 +6,7 @@
 //!
 //! * [`clock`]: the handle.
 //! * [`channel`]: bounded queues between participants. [`signal`]: one thread waits, anybody notifies.
-//! * [`simulated`]: the scheduler that hands one token round; [`turns`]: who is next.
+//! * [`simulated`]: the scheduler that hands one token round; [`schedule`]: who is next.
 //! * [`tasks`]: what is done again and again, with a thread of its own in real time and without one in simulated time.
 //! * [`wall`]: the calendar's time, for what is written down for people. Nothing is decided by it.
 
@@ -15,18 +15,18 @@
 
 pub mod channel;
 pub mod clock;
+pub mod schedule;
 pub mod signal;
 pub mod simulated;
 pub mod tasks;
 #[cfg(test)]
 mod tests;
-pub mod turns;
 pub mod wall;
 
 pub use channel::{Receiver, RecvError, SendError, Sender, TryRecvError, TrySendError};
 pub use clock::{Clock, Guard, Join, JoinError, Released};
+pub use schedule::TaskWait;
 pub use signal::Signal;
-pub use turns::TaskWait;
 pub use wall::Wall;
 
 use std::sync::{Mutex, MutexGuard, PoisonError};

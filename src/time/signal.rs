@@ -4,7 +4,7 @@
 //! one: the waiting thread is parked, and un-parking it is one atomic exchange (and a system call when it sleeps).
 
 use super::clock::{Clock, TimeKind};
-use super::turns::WaitUntil;
+use super::schedule::WaitUntil;
 use super::{Time, lock};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, OnceLock};

@@ -1,10 +1,10 @@
 //! The scheduler of simulated time: one token, handed round in a fixed order.
 //!
-//! One mutex guards everything; every participant waits for a turn of its own, so that a hand-over wakes exactly one thread,
+//! One mutex guards everything; every participant is parked by itself, so that a hand-over wakes exactly one thread,
 //! and wakes it when the mutex is free again. Tasks ([`super::tasks`]) are participants without a thread of their own. Locks
 //! are taken in the order *channel or signal, then scheduler*, never the reverse.
 
-use super::turns::{Called, Id, SchedulerState, WaitUntil};
+use super::schedule::{Called, Id, SchedulerState, WaitUntil};
 use super::{Time, lock};
 use std::cell::RefCell;
 use std::cmp::Reverse;
@@ -89,10 +89,10 @@ impl Scheduler {
         }
     }
 
-    /// The calling thread is participant `id` from now on; waits for its turn.
+    /// The calling thread is participant `id` from now on; waits for the token.
     pub(super) fn begin(&self, id: Id) {
         self.be(id);
-        self.wait_for_turn(lock(&self.state), id, Called::Nobody);
+        self.wait_for_token(lock(&self.state), id, Called::Nobody);
     }
 
     /// Room for what [`Self::be`] notes, so that a task's step allocates nothing whoever runs it.
@@ -224,16 +224,16 @@ impl Scheduler {
         woken
     }
 
-    /// Gives the token away and waits for the next turn.
+    /// Gives the token away and waits for it.
     fn block<'a>(&'a self, mut state: MutexGuard<'a, SchedulerState>, me: Id) {
         state.running = None;
         let called = self.dispatch(&mut state, Some(me));
-        self.wait_for_turn(state, me, called);
+        self.wait_for_token(state, me, called);
     }
 
     /// Waits until `me` has the token; `called` is woken first.
-    fn wait_for_turn<'a>(&'a self, mut state: MutexGuard<'a, SchedulerState>, me: Id, mut called: Called) {
-        let Some(turn) = state.participants.get(&me).map(|p| p.turn.clone()) else { return };
+    fn wait_for_token<'a>(&'a self, mut state: MutexGuard<'a, SchedulerState>, me: Id, mut called: Called) {
+        let Some(parker) = state.participants.get(&me).map(|p| p.parker.clone()) else { return };
         while state.running != Some(me) {
             let pacing = state.pacer == Some(me) && state.running.is_none();
             let watched = match (&self.pace, pacing.then(|| state.next_timer()).flatten()) {
@@ -243,7 +243,7 @@ impl Scheduler {
             drop(state);
             self.call(std::mem::replace(&mut called, Called::Nobody));
             if watched.is_none_or(|left| !left.is_zero()) {
-                turn.wait(watched);
+                parker.park(watched);
             }
             state = lock(&self.state);
             if watched.is_some() {
@@ -257,7 +257,7 @@ impl Scheduler {
     pub(super) fn call(&self, called: Called) {
         match called {
             Called::Nobody => {}
-            Called::Thread(turn) => turn.call(),
+            Called::Thread(parker) => parker.unpark(),
             Called::Runner => self.idle_runners.notify_one(),
         }
     }
@@ -281,7 +281,7 @@ impl Scheduler {
                     state.due = Some(id);
                     return Called::Runner;
                 }
-                return if blocked == Some(id) { Called::Nobody } else { Called::Thread(participant.turn.clone()) };
+                return if blocked == Some(id) { Called::Nobody } else { Called::Thread(participant.parker.clone()) };
             }
             let Some((at, _)) = state.next_timer() else { return Called::Nobody };
             // A clock that follows real time goes on anyway.
@@ -296,7 +296,7 @@ impl Scheduler {
                 if state.pacer != watcher || blocked.is_none() {
                     state.pacer = watcher;
                     if let Some(participant) = watcher.and_then(|id| state.participants.get(&id)) {
-                        return Called::Thread(participant.turn.clone());
+                        return Called::Thread(participant.parker.clone());
                     }
                 }
                 return Called::Nobody;

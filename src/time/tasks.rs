@@ -6,8 +6,8 @@
 //! hangs) keeps its thread, and another one goes on with the rest. The order of steps is that of threads.
 
 use super::clock::{Clock, Join, JoinError, TaskThread, TimeKind};
+use super::schedule::{Called, ClockTask, Id, TaskWait, WaitUntil};
 use super::simulated::Scheduler;
-use super::turns::{Called, ClockTask, Id, TaskWait, WaitUntil};
 use super::{Sender, Signal, Time, lock};
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};

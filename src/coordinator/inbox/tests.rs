@@ -347,7 +347,7 @@ proptest! {
         let precedence = |event: EventName| match event {
             event if event == name(0) => Precedence::Urgent,
             event if event == name(1) || event == name(2) => Precedence::UrgentAsLast,
-            _ => Precedence::InTurn,
+            _ => Precedence::Queued,
         };
         let patient = InboxBounds { row: 100, report: 100, outside: 100, ..SMALL };
         let mut inbox = Inbox::within(patient, (0..DECLARED).map(name));

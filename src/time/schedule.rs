@@ -45,7 +45,7 @@ pub(super) struct SchedulerState {
     /// Who watches real time, when paced.
     pub(super) pacer: Option<Id>,
     pub(super) hand_overs: u64,
-    /// The task whose turn it is, until one of the threads that run tasks has taken it.
+    /// The task that has the token, until one of the threads that run tasks has taken it.
     pub(super) due: Option<Id>,
     /// The threads that run tasks, one for each.
     pub(super) runners: FxHashMap<ThreadId, JoinHandle<()>>,
@@ -53,11 +53,11 @@ pub(super) struct SchedulerState {
 
 #[derive(Default)]
 pub(super) struct Participant {
-    pub(super) turn: Arc<Turn>,
+    pub(super) parker: Arc<Parker>,
     /// The wait it is in; none: ready or running.
     pub(super) wait: Option<u64>,
-    /// A task between two of its steps: whoever runs tasks takes it from here. None: a thread waits for the turn, also that
-    /// of a task whose step waits for something in the middle.
+    /// A task between two of its steps: whoever runs tasks takes it from here. None: a thread waits for the token, also
+    /// that of a task whose step waits for something in the middle.
     pub(super) task: Option<Box<dyn ClockTask>>,
 }
 
@@ -83,35 +83,35 @@ pub enum TaskWait {
     End,
 }
 
-/// How a thread is told to look whether it is its turn. Its own lock, so that who is woken does not meet the waker at the
-/// scheduler's.
+/// Where a thread is parked until it is told to look whether it has the token. Its own lock, so that who is woken does not meet the
+/// waker at the scheduler's.
 #[derive(Default)]
-pub(super) struct Turn {
-    called: Mutex<bool>,
+pub(super) struct Parker {
+    unparked: Mutex<bool>,
     changed: Condvar,
 }
 
-impl Turn {
-    pub(super) fn call(&self) {
-        *lock(&self.called) = true;
+impl Parker {
+    pub(super) fn unpark(&self) {
+        *lock(&self.unparked) = true;
         self.changed.notify_one();
     }
 
-    /// Waits until it is called, at most for so long.
-    pub(super) fn wait(&self, longest: Option<Duration>) {
-        let mut called = lock(&self.called);
-        while !*called {
-            called = match longest {
-                None => self.changed.wait(called).unwrap_or_else(PoisonError::into_inner),
+    /// Waits until it is unparked, at most for so long.
+    pub(super) fn park(&self, longest: Option<Duration>) {
+        let mut unparked = lock(&self.unparked);
+        while !*unparked {
+            unparked = match longest {
+                None => self.changed.wait(unparked).unwrap_or_else(PoisonError::into_inner),
                 Some(longest) => {
                     // Whoever waits for a time looks again in any case.
-                    let waited = self.changed.wait_timeout(called, longest);
+                    let waited = self.changed.wait_timeout(unparked, longest);
                     *waited.unwrap_or_else(PoisonError::into_inner).0 = false;
                     return;
                 }
             };
         }
-        *called = false;
+        *unparked = false;
     }
 }
 
@@ -119,7 +119,7 @@ impl Turn {
 #[must_use = "whoever has the token sleeps until it is called"]
 pub(super) enum Called {
     Nobody,
-    Thread(Arc<Turn>),
+    Thread(Arc<Parker>),
     /// One of the threads that run tasks.
     Runner,
 }
