@@ -25,8 +25,11 @@ impl Product<'_> {
         self.notices(state, nexts);
         self.operators(state, nexts);
         self.safe_comes_elsewhere(state, nexts);
+        // Who has asked for nothing since it was down has nothing to be kept, but is led down all the same where it is not there.
+        let led_down = state.stopping && !self.all_in(state, |member| member.down);
         if self.others
             && state.is_at_rest()
+            && !led_down
             && self.all_down(state)
             && let Some(world) = self.worlds.settle_down(state.world)
             && (world != state.world || state.stopping)

@@ -4,7 +4,7 @@ use crate::aside::Chance;
 use crate::flat;
 use crate::support::Small;
 use davit::check::{Effort, Report, run_with};
-use davit::model::Severity;
+use davit::model::{Severity, codes};
 use std::collections::BTreeSet;
 
 /// A drive with a coordinator of its own: it is made, and stopped by its own safe configuration where that is asked for. `heard` are
@@ -50,6 +50,27 @@ fn drives(parts: &[(&str, &str, &str)]) -> Small {
 fn followed(small: &Small, together: bool) -> Report {
     let read = small.read();
     run_with(read.deployment, &read.catalogue, Effort { together, transitions: 300_000, ..Effort::default() })
+}
+
+/// It waits for somebody where the event that ends the deployment is not heard: that event is raised once, whoever else hears it.
+#[test]
+fn who_waits_where_nobody_leads_it_down_is_told_beside_others_too() {
+    let waits = "idle = state {}, waiting = state {}, up = state {},
+        trans { src = 'initial', tgt = 'idle' },
+        trans { src = 'idle', tgt = 'waiting', events = { 'e_start' } },
+        trans { src = 'waiting', tgt = 'up', events = { 'e_b_on' } },
+        trans { src = 'up', tgt = 'idle', events = { 'e_shutdown' } },";
+    let follows = "idle = state {}, up = state {}, trans { src = 'initial', tgt = 'idle' },
+        trans { src = 'idle', tgt = 'up', events = { 'e_start' } },
+        trans { src = 'up', tgt = 'idle', events = { 'e_shutdown' } },";
+    for coordinators in [&[("b", waits)][..], &[("b", waits), ("c", follows)]] {
+        let small = Small::several("", coordinators, "");
+        for together in [false, true] {
+            let told = followed(&small, together).findings;
+            let told: Vec<_> = told.iter().filter(|finding| finding.severity > Severity::Info).collect();
+            assert!(told.iter().any(|finding| finding.code == codes::COORD_NO_WAY_DOWN), "{together}: {told:?}");
+        }
+    }
 }
 
 /// Three cost three times what one costs, and not the product.

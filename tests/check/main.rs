@@ -10,6 +10,7 @@ mod flat;
 mod advice;
 mod alike;
 mod apart;
+mod apart_random;
 mod aside;
 mod asked;
 mod automata;

@@ -206,8 +206,8 @@ fn a_fault_goes_into_a_component_at_its_time() {
     assert_eq!(ran.code, 0, "{}{}", ran.out, ran.err);
     assert!(ran.err.is_empty() && ran.out.contains("0.250 s  inject  gain: panic"), "{}{}", ran.out, ran.err);
     let types = crate::demo::at_home(&["types", "youbot.Driver"]);
-    for line in ["overcurrent(joint: int = 0 (0 … 5))", "undervoltage()", "stall(seconds: float)", "its code panics"]
-    {
+    let stall = "stall(seconds: float, operation: string = \"\")";
+    for line in ["overcurrent(joint: int = 0 (0 … 5))", "undervoltage()", stall, "its code panics"] {
         assert!(types.out.contains(line), "{line}: {}", types.out);
     }
 }

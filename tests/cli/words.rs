@@ -114,6 +114,11 @@ fn wrong(cli: &Command, words: &[String]) -> Option<String> {
     let mut operands = 0;
     let mut rest = words[1..].iter();
     while let Some(word) = rest.next() {
+        // From here on all are operands, whatever they begin with.
+        if word == "--" {
+            operands += rest.len();
+            break;
+        }
         let bare = word.trim_matches(['[', ']', ',', '.', ';', ':', ')']);
         let (name, value) = bare.split_once('=').map_or((bare, None), |(name, value)| (name, Some(value)));
         let flag = match (name.strip_prefix("--"), name.strip_prefix('-')) {

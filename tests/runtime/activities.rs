@@ -69,7 +69,7 @@ fn behind_a_long_operation_comes_one_round_for_all_that_is_missed() {
     b.create("s", "Slow", "slow", &[]);
     b.start(&["s"]);
     b.wait(MS * 12);
-    let stall = davit::model::Injection::Stall { time: MS * 25 };
+    let stall = davit::model::Injection::Stall { time: MS * 25, operation: None };
     b.platform.inject(name("s"), &stall, b.clock.now() + MS * 5).unwrap();
     b.wait(MS * 33);
     assert_eq!(log::take(&b.clock), ["s 0 dt 10", "s 10 dt 10", "s 37 dt 20", "s 40 dt 10"]);

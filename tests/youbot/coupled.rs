@@ -385,11 +385,11 @@ fn they_couple_follow_and_let_go_together() {
     pair.until("right_disable_copying.ok", 0.1);
     pair.run(0.2);
     let rows = pair.rows();
-    let last =
-        |side: usize| rows.iter().filter(|(_, h)| h[side].force.norm() > 0.0).map(|(at, _)| *at).fold(0.0, f64::max);
-    let (left, right) = (last(0) - t, last(1) - t);
+    // It may be told aligned, and begin again, a moment later.
+    let gone = |side: usize| rows.iter().find(|(_, h)| h[side].force.norm() == 0.0).map_or(f64::NAN, |(at, _)| *at - t);
+    let (left, right) = (gone(0), gone(1));
     println!("let go of: {:.1} ms, the other one {:.1} ms", right * 1e3, left * 1e3);
-    assert!(right <= 0.101 && left > right - 0.003 && left <= right + PACKET, "{right} {left}");
+    assert!(right <= 0.102 && left > right - 0.003 && left <= right + PACKET, "{right} {left} {:?}", pair.story(t));
     pair.down();
 }
 
@@ -413,7 +413,8 @@ fn what_is_cut_is_lost_at_both_ends() {
     let rows = pair.rows();
     let still = rows.iter().filter(|(at, _)| *at > t + 0.12 + 0.1 + PACKET).flat_map(|(_, halves)| halves.iter());
     let force = still.map(|half| half.force.norm()).fold(0.0, f64::max);
-    assert!(force == 0.0, "{force} N");
+    let all: Vec<_> = rows.iter().map(|(at, h)| (*at - t, h[0].force.norm(), h[1].force.norm())).step_by(20).collect();
+    assert!(force == 0.0, "{force} N {all:?} {:?}", pair.story(t));
     pair.set("left_Net", "cut", false);
     pair.hand("align 6; free 600");
     pair.until("right_enable_copying.ok", 10.0);

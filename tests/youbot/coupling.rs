@@ -1,5 +1,6 @@
 //! The coupling of two robots, law against law over a delayed link: the figures the design rests on.
 
+use davit::libraries::youbot::dynamics::DynamicsParameters;
 use davit::libraries::youbot::hand::{Hand, HandScript};
 use davit::libraries::youbot::impedance::{CouplingLaw, Reference};
 use davit::libraries::youbot::network::{Network, Quality};
@@ -68,6 +69,8 @@ pub struct Scenario {
     pub damping_abs: f64,
     pub quality: Quality,
     pub friction_comp: f64,
+    /// None here: the figures of the design check are those of a follower that sticks.
+    pub stiction_comp: f64,
     pub force_gain: f64,
     pub recenter: f64,
     pub script: &'static str,
@@ -85,6 +88,7 @@ impl Default for Scenario {
             damping_abs: 5.0,
             quality: Quality { delay: 0.005, ..Quality::default() },
             friction_comp: 0.9,
+            stiction_comp: 0.0,
             force_gain: 0.0,
             recenter: 5.0,
             script: "sway 60 0.042 0.042 0 0.15",
@@ -107,6 +111,7 @@ impl Scenario {
             p.ref_max_age = 10.0;
             let p = &mut side.robot.dynamics.parameters;
             p.friction_comp = self.friction_comp;
+            p.stiction_comp = self.stiction_comp;
             p.force_gain = Vector3::repeat(self.force_gain);
             p.recenter_gain = self.recenter;
         }
@@ -169,6 +174,19 @@ fn a_stiffer_coupling_follows_closer() {
             mm(figures.rms),
             rms_less_compensation,
         );
+    }
+}
+
+/// As the robots come: who sticks is helped along the force that pulls it.
+#[test]
+fn who_does_not_stick_follows_closer() {
+    let helped = DynamicsParameters::default().stiction_comp;
+    for stiffness in [150.0, 300.0] {
+        let with = |stiction_comp| Scenario { stiffness, stiction_comp, ..Scenario::default() }.run();
+        let (sticks, follows) = (with(0.0), with(helped));
+        println!("{stiffness} N/m: {:.1} mm, helped {:.1} mm", mm(sticks.rms), mm(follows.rms));
+        assert!(follows.rms < 0.85 * sticks.rms, "{sticks:?} {follows:?}");
+        assert!(follows.hand_rms < 1.05 * sticks.hand_rms && follows.saturated == 0.0, "{sticks:?} {follows:?}");
     }
 }
 

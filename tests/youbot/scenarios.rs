@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Each with what is set for it here: what takes a minute in the file is shorter.
-const SCENARIOS: [(&str, &[(&str, &str)]); 28] = [
+const SCENARIOS: [(&str, &[(&str, &str)]); 30] = [
     ("blocked", &[]),
     ("bring_up", &[]),
     ("configurator", &[]),
@@ -20,6 +20,7 @@ const SCENARIOS: [(&str, &[(&str, &str)]); 28] = [
     ("hang", &[]),
     ("hang_in_bring_up", &[]),
     ("late", &[]),
+    ("left_alone", &[("cases", "4")]),
     ("link", &[]),
     ("modes", &[]),
     ("modes_in_motion", &[]),
@@ -37,6 +38,7 @@ const SCENARIOS: [(&str, &[(&str, &str)]); 28] = [
     ("tracking", &[("seconds", "20")]),
     ("tuned", &[]),
     ("udp", &[]),
+    ("variants", &[("pairs", "1"), ("seconds", "7")]),
 ];
 
 fn folder() -> PathBuf {
@@ -138,6 +140,11 @@ fn late() {
 }
 
 #[test]
+fn left_alone() {
+    run("left_alone");
+}
+
+#[test]
 fn link() {
     run("link");
 }
@@ -215,6 +222,11 @@ fn tracking() {
 #[test]
 fn tuned() {
     run("tuned");
+}
+
+#[test]
+fn variants() {
+    run("variants");
 }
 
 #[test]

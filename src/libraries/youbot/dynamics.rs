@@ -5,8 +5,9 @@ use super::handover::TORQUE_SLEW;
 use super::impedance::{ENGAGE, FADE};
 use super::parameters::{COULOMB, FRICTION_SLOPE, JOINTS, TORQUE_LIMIT, WORKING_POSE_DEG};
 use super::plant::joint_ranges;
-use super::rigid_body::{ArmModel, J5, Jacobian, Posture, radians};
-use nalgebra::{Cholesky, Const, Matrix3, SMatrix, Vector3};
+use super::rigid_body::{ArmModel, J5, Jacobian, radians};
+use super::tool_space::ToolSpace;
+use nalgebra::{SMatrix, Vector3};
 
 /// Tool velocity in the world per base twist (in the base's frame) and joint speed: 3×8.
 pub type Jacobian8 = SMatrix<f64, 3, 8>;
@@ -20,6 +21,8 @@ pub struct DynamicsParameters {
     pub gravity_gain: f64,
     /// Share of Coulomb friction that is compensated, where the joint turns and where the wanted force pulls it.
     pub friction_comp: f64,
+    /// How much of that a joint at rest has: the hyperbolic tangent of this times the pull of the wanted force beside its friction. 0: none.
+    pub stiction_comp: f64,
     /// Pull to the nominal posture where it does not move the tool, in N m/rad.
     pub posture_stiffness: f64,
     /// Its damping, in N m s/rad.
@@ -42,6 +45,7 @@ impl Default for DynamicsParameters {
             force_gain: Vector3::zeros(),
             gravity_gain: 1.0,
             friction_comp: 0.9,
+            stiction_comp: 1.25,
             posture_stiffness: 8.0,
             posture_damping: 3.0,
             recenter_gain: 5.0,
@@ -62,17 +66,18 @@ impl DynamicsParameters {
 
 /// Share of a joint's range within which the soft limits are silent.
 const WORKING_RANGE: f64 = 0.95;
-/// Damping of the operational-space inverse near singular poses, in 1/kg.
-const SINGULARITY_DAMPING: f64 = 1e-4;
 
 /// Speed of recentring from which the arm's counter-motion is helped with all of the friction compensation, in m/s.
 const COUNTER_SPEED: f64 = 0.01;
 /// How the recentring sets out once the base yields, in m/s²: a base that went off at once for what is centimetres off would drive
 /// the arm's joints faster than a push does, with nobody touching anything.
 const SETTING_OUT: f64 = 0.4;
-/// How fast the joints may have to turn for a base that goes faster than the tool, in rad/s: the wrist, which is light and has a
-/// long lever, makes up for most of it.
-const LEFT_BEHIND: f64 = 0.3;
+/// Joints slower than that stick, in rad/s, and a base that is slower than that, in m/s and rad/s, stands.
+const STILL: f64 = 1e-3;
+/// Joints that are faster than that are moved by somebody, in rad/s.
+const LED: f64 = 0.01;
+/// For how long a base goes on that carries an arm along whose joints stick, in s.
+const CARRIED: f64 = 1.0;
 /// Joint speed by which the counter-motion may be wrong before all of the friction compensation corrects it, in rad/s.
 const COUNTER_SLOPE: f64 = 0.03;
 
@@ -91,6 +96,8 @@ pub struct Dynamics {
     mutual: f64,
     /// For how long the base has yielded, in s.
     yielding: f64,
+    /// For how long it has carried an arm along that sticks, in s.
+    carried: f64,
 }
 
 /// What the coupling wants of the law.
@@ -128,43 +135,19 @@ pub fn soft_limits(q: &J5, stiffness: f64) -> J5 {
     out
 }
 
-/// The arm as its tool feels it.
-struct ToolSpace {
-    /// Tool velocity in the world per joint speed.
-    arm: Jacobian,
-    mass: Cholesky<f64, Const<JOINTS>>,
-    /// Of the inverse of the tool's apparent mass.
-    inertia: Cholesky<f64, Const<3>>,
-}
-
-impl ToolSpace {
-    /// None: the masses given are not those of a body.
-    fn of(model: &ArmModel, at: &Posture, arm: &Jacobian) -> Option<Self> {
-        let mass = model.mass_matrix_with_drives(at).cholesky()?;
-        let mobility = arm * mass.solve(&arm.transpose()) + Matrix3::identity() * SINGULARITY_DAMPING;
-        Some(Self { arm: *arm, mass, inertia: mobility.cholesky()? })
-    }
-
-    /// Joint speeds with which a force on the tool would make it move with `speed` (m/s, in the world).
-    fn joints(&self, speed: &Vector3<f64>) -> J5 {
-        self.mass.solve(&self.arm.tr_mul(&self.inertia.solve(speed)))
-    }
-
-    /// The share of a motion of the base that the joints make up for, where the tool, which would be carried along with
-    /// `carried`, goes with `speed` (both in m/s, in the world). A base that went faster, whether it is after the tool or gives way
-    /// to a force, would turn the joints as a push does, which is an overspeed.
-    fn share_followed(&self, carried: &Vector3<f64>, speed: &Vector3<f64>) -> f64 {
-        let Some(ahead) = carried.try_normalize(f64::EPSILON) else { return 1.0 };
-        let most = speed.dot(&ahead).max(0.0) + LEFT_BEHIND / self.joints(&ahead).amax();
-        (most / carried.norm()).min(1.0)
-    }
-}
-
 impl Dynamics {
     /// A law for an arm.
     pub fn new(model: ArmModel) -> Self {
         let (coupling, pull) = (J5::zeros(), J5::zeros());
-        Self { model, parameters: DynamicsParameters::default(), coupling, pull, mutual: 0.0, yielding: 0.0 }
+        Self {
+            model,
+            parameters: DynamicsParameters::default(),
+            coupling,
+            pull,
+            mutual: 0.0,
+            yielding: 0.0,
+            carried: 0.0,
+        }
     }
 
     /// One step of `dt` seconds. `moves`: how the base does, in its frame. `coupled`: what the coupling wants; none: nothing, or
@@ -190,13 +173,21 @@ impl Dynamics {
         for i in 0..JOINTS {
             // Who is pulled is helped out of sticking, too, by what the pull is beside the joint's friction. That puts no energy into
             // the arm, whatever the delay: the compensation never is more than the friction that takes it.
-            let along = qd[i] / FRICTION_SLOPE + self.pull[i] / COULOMB[i];
+            let along = qd[i] / FRICTION_SLOPE + p.stiction_comp * self.pull[i] / COULOMB[i];
             torque[i] += p.friction_comp * COULOMB[i] * along.tanh();
         }
         let (mut twist, mut coupling) = (Twist2::default(), J5::zeros());
         self.mutual = (self.mutual + if mutual { dt / ENGAGE } else { -dt / FADE }).clamp(0.0, 1.0);
         let yields = p.yields() && self.mutual > 0.0 && coupled.is_some();
         self.yielding = if yields { self.yielding + dt } else { 0.0 };
+        self.carried = match qd.amax() {
+            led if led > LED => 0.0,
+            still if still < STILL && moves.vx.hypot(moves.vy).max(moves.wz.abs()) > STILL => self.carried + dt,
+            _ => self.carried,
+        };
+        // What sticks is not where the tool is wanted and does not come nearer: the base would drive on for ever, with nobody
+        // touching anything. It waits until somebody moves the arm.
+        let yields = yields && self.carried < CARRIED;
         if let Some(Coupled { force, engaged, .. }) = coupled {
             coupling = pull;
             let tool = ToolSpace::of(&self.model, &at, &arm);
@@ -251,47 +242,14 @@ impl Dynamics {
     pub fn reset(&mut self) {
         (self.coupling, self.pull) = (J5::zeros(), J5::zeros());
         self.mutual = 0.0;
-        self.yielding = 0.0;
-    }
-}
-
-/// What the base is allowed to do.
-#[derive(Debug, Clone, Copy)]
-pub struct BaseLimits {
-    /// In m/s.
-    pub v_max: f64,
-    /// In rad/s.
-    pub w_max: f64,
-    /// In m/s² (and rad/s² times one metre).
-    pub a_max: f64,
-    /// Speeds below it are zero, in m/s.
-    pub deadband: f64,
-}
-
-impl Default for BaseLimits {
-    fn default() -> Self {
-        Self { v_max: 0.3, w_max: 0.6, a_max: 1.0, deadband: 0.01 }
-    }
-}
-
-impl BaseLimits {
-    /// The next command after `last`, `dt` seconds later, towards `wanted`.
-    pub fn limit(&self, wanted: Twist2, last: Twist2, dt: f64) -> Twist2 {
-        let one = |want: f64, last: f64, most: f64| {
-            let want = if want.abs() < self.deadband { 0.0 } else { want.clamp(-most, most) };
-            last + (want - last).clamp(-self.a_max * dt, self.a_max * dt)
-        };
-        Twist2 {
-            vx: one(wanted.vx, last.vx, self.v_max),
-            vy: one(wanted.vy, last.vy, self.v_max),
-            wz: one(wanted.wz, last.wz, self.w_max),
-        }
+        (self.yielding, self.carried) = (0.0, 0.0);
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::kinematics::Tool;
+    use super::super::tool_space::LEFT_BEHIND;
     use super::*;
 
     const STANDS: Twist2 = Twist2 { vx: 0.0, vy: 0.0, wz: 0.0 };
@@ -347,9 +305,10 @@ mod tests {
         let rest = Coupled { force: Vector3::zeros(), engaged: 1.0, peer_yields: true };
         // The tool goes ahead of it.
         let ahead = Twist2 { vx: off.x * 20.0, vy: off.y * 20.0, wz: 0.0 };
+        let led = J5::from([0.0, 0.0, 0.0, 0.0, 2.0 * LED]);
         let mut last = 0.0;
         for tick in 1..=6000 {
-            let twist = law.update(&q, &J5::zeros(), &tool.jacobian, ahead, Some(&rest), 0.001).twist;
+            let twist = law.update(&q, &led, &tool.jacobian, ahead, Some(&rest), 0.001).twist;
             let speed = twist.vx.hypot(twist.vy);
             let most = SETTING_OUT * f64::from(tick) * 0.001;
             assert!(speed <= most + 1e-9 && speed >= last - 1e-9, "{speed} after {tick} ms");
@@ -358,8 +317,29 @@ mod tests {
         assert!((last - law.parameters.recenter_gain * off.norm()).abs() < 1e-6, "in the end all of it: {last}");
         // Once more from where it is.
         law.update(&q, &J5::zeros(), &tool.jacobian, ahead, None, 1.0);
-        let again = law.update(&q, &J5::zeros(), &tool.jacobian, ahead, Some(&rest), 0.001).twist;
+        let again = law.update(&q, &led, &tool.jacobian, ahead, Some(&rest), 0.001).twist;
         assert!(again.vx.hypot(again.vy) < 1e-3, "{again:?}");
+    }
+
+    #[test]
+    fn a_base_that_carries_an_arm_along_that_sticks_waits_until_somebody_moves_it() {
+        let model = ArmModel::youbot(0.219, 1.0);
+        let mut law = Dynamics::new(model.clone());
+        law.parameters.force_gain = Vector3::new(0.1, 0.1, 0.1);
+        let q = radians([0.0, -40.0, 100.0, 60.0, 0.0]);
+        let tool = Tool::of(&model, &q, &J5::zeros(), Default::default(), Default::default());
+        let pull = Coupled { force: Vector3::new(0.3, 0.0, 0.0), engaged: 1.0, peer_yields: true };
+        let mut after = |seconds: f64, speed: f64, moves: Twist2| {
+            let update = |_| law.update(&q, &J5::repeat(speed), &tool.jacobian, moves, Some(&pull), 0.001).twist;
+            (0..(seconds * 1e3) as usize).map(update).last().expect("updates")
+        };
+        let along = Twist2 { vx: 0.02, ..STANDS };
+        assert_ne!(after(0.9, 0.0, along), STANDS);
+        assert_eq!(after(0.2, 0.0, along), STANDS, "nobody moves the arm");
+        assert_eq!(after(5.0, 0.0, STANDS), STANDS);
+        assert_ne!(after(0.1, 0.02, STANDS), STANDS, "somebody does");
+        assert_ne!(after(5.0, 0.0, STANDS), STANDS, "it has not set out yet");
+        assert_ne!(after(5.0, 0.02, along), STANDS, "it follows");
     }
 
     #[test]
@@ -384,7 +364,7 @@ mod tests {
             let mut after = |moves: Twist2| {
                 law.reset();
                 let update = |_| law.update(&q, &J5::zeros(), &tool.jacobian, moves, Some(&pull), 0.001).twist;
-                (0..2000).map(update).last().expect("updates")
+                (0..900).map(update).last().expect("updates")
             };
             let asked = |wanted: Twist2| space.joints(&(base * Vector3::new(wanted.vx, wanted.vy, wanted.wz))).amax();
             let stands = after(STANDS);
@@ -413,7 +393,7 @@ mod tests {
             let coupled = (tick < 200).then_some(&pull);
             let out = law.update(&q, &J5::zeros(), &tool.jacobian, STANDS, coupled, 0.001);
             // The force's own, and the friction compensation's for its sake.
-            let bound = 0.2 * (1.0 + law.parameters.friction_comp);
+            let bound = 0.2 * (1.0 + law.parameters.friction_comp * law.parameters.stiction_comp);
             assert!((out.torque - last).amax() <= bound + 1e-9, "{last} {}", out.torque);
             last = out.torque;
             most = most.max((last - alone).amax());
@@ -436,27 +416,18 @@ mod tests {
             let update = |_| law.update(&q, &qd, &tool.jacobian, STANDS, Some(&coupled), 0.001).torque;
             let torque = (0..200).map(update).last().expect("updates");
             let (own, share) = (arm.tr_mul(&pull), law.parameters.friction_comp);
+            let steep = law.parameters.stiction_comp;
             let help = torque - carried - own;
             for i in 0..JOINTS {
                 assert!(help[i].abs() <= share * COULOMB[i] + 1e-9, "{help}");
                 if qd[i] == 0.0 {
                     let most = share * COULOMB[i];
                     assert!(
-                        (help[i] - most * (own[i] / COULOMB[i]).tanh()).abs() < 1e-9,
+                        (help[i] - most * (steep * own[i] / COULOMB[i]).tanh()).abs() < 1e-9,
                         "along the pull: {help} {own}"
                     );
                 }
             }
         }
-    }
-
-    #[test]
-    fn the_base_is_limited() {
-        let limits = BaseLimits::default();
-        let mut t = Twist2::default();
-        for _ in 0..1000 {
-            t = limits.limit(Twist2 { vx: 5.0, vy: 0.005, wz: -9.0 }, t, 0.004);
-        }
-        assert_eq!((t.vx, t.vy, t.wz), (0.3, 0.0, -0.6));
     }
 }

@@ -19,6 +19,7 @@ pub mod plant;
 pub mod rigid_body;
 pub mod robot;
 pub mod tank;
+mod tool_space;
 pub mod world;
 
 pub use components::library;

@@ -1,8 +1,8 @@
 //! One whole robot in one struct: plant and control laws, stepped at 1 kHz. It is what the stand-in for the other robot
 //! is made of, and two of them make the coupling that the figures are measured on.
 
-use super::base::Twist2;
-use super::dynamics::{BaseLimits, Coupled, Dynamics};
+use super::base::{BaseLimits, Twist2};
+use super::dynamics::{Coupled, Dynamics};
 use super::impedance::{Impedance, Reference};
 use super::kinematics::Tool;
 use super::rigid_body::{ArmModel, J5};

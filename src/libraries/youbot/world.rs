@@ -157,6 +157,11 @@ impl RobotBody {
         }
     }
 
+    /// From now on the masses of its arm are this multiple of the nominal ones: a robot as it may be, or one that takes up a load.
+    pub fn weigh(&mut self, mass_scale: f64) {
+        self.arm.model = ArmModel::youbot(GRIPPER.mass, mass_scale);
+    }
+
     /// Where the tool is in the world, and how it moves.
     pub fn tool(&self) -> Tool {
         match self.seen.is_of(&self.arm, &self.base) {

@@ -2,8 +2,7 @@
 
 use super::samples::{Odometry, Twist};
 use super::{aged, going_on};
-use crate::libraries::youbot::base::Twist2;
-use crate::libraries::youbot::dynamics::BaseLimits;
+use crate::libraries::youbot::base::{BaseLimits, Twist2};
 use crate::runtime::{Builder, Component, Context, In, OperationAnswer, Out, Prop};
 
 /// A wanted twist older than this is none, in s.

@@ -29,6 +29,7 @@ pub struct DynamicsComponent {
     gravity_gain: Prop<f64>,
     payload: Prop<f64>,
     friction_comp: Prop<f64>,
+    stiction_comp: Prop<f64>,
     posture_stiffness: Prop<f64>,
     posture_damping: Prop<f64>,
     recenter_gain: Prop<f64>,
@@ -92,9 +93,16 @@ impl Component for DynamicsComponent {
                 .tunable(Tunable::Stopped)
                 .property("payload", GRIPPER.mass),
             friction_comp: b
-                .doc("Share of Coulomb friction compensated, along the motion and along the wanted force; more than 1 makes the arm run away.")
+                .doc("Share of Coulomb friction compensated; more than 1 makes the arm run away.")
                 .range(0.0..=1.0)
                 .property("friction_comp", p.friction_comp),
+            stiction_comp: b
+                .doc(
+                    "How much of friction_comp a joint at rest has along the wanted force: the hyperbolic tangent of this times the \
+                     force's torque beside the joint's friction. 0: none, the follower sticks.",
+                )
+                .range(0.0..=5.0)
+                .property("stiction_comp", p.stiction_comp),
             posture_stiffness: b
                 .doc("Pull to the working posture where it does not move the tool.")
                 .unit("N m/rad")
@@ -131,6 +139,7 @@ impl Component for DynamicsComponent {
             force_gain: self.force_gain.get(),
             gravity_gain: self.gravity_gain.get(),
             friction_comp: self.friction_comp.get(),
+            stiction_comp: self.stiction_comp.get(),
             posture_stiffness: self.posture_stiffness.get(),
             posture_damping: self.posture_damping.get(),
             recenter_gain: self.recenter_gain.get(),

@@ -65,9 +65,8 @@ impl WorldRobot {
                 .tunable(Tunable::Unconfigured)
                 .property(&named("q_start"), radians(PARK_POSE_DEG)),
             mass_scale: b
-                .doc("Its masses, as a multiple of the nominal ones.")
+                .doc("Masses of its arm, as a multiple of the nominal ones.")
                 .range(0.1..=3.0)
-                .tunable(Tunable::Unconfigured)
                 .property(&named("mass_scale"), 1.0),
             friction_scale: b
                 .doc("Its friction, as a multiple of the nominal one.")
@@ -106,6 +105,9 @@ impl WorldRobot {
         let command = command.map_or(PlantCommand { braked: true, ..PlantCommand::default() }, |(command, _)| command);
         let push = aged(&mut self.ext_force, cx).filter(|(_, age)| *age <= PUSH_STALE);
         let push = push.map(|(force, _)| force).unwrap_or_default();
+        if self.mass_scale.changed() {
+            self.body.weigh(self.mass_scale.get());
+        }
         self.body.arm.friction_scale = self.friction_scale.get();
         self.body.torque_lag = self.torque_lag.get();
         let bar = surroundings.bar.map(|bar| Bar { at: bar.at - self.place.get(), ..bar });
