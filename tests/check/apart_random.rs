@@ -300,12 +300,11 @@ fn random_coordinators_are_judged_apart_as_together() {
         more_in += usize::from(!more.is_empty());
         let unexplained: Vec<_> = more.iter().filter(|(code, _)| !is_only_told_apart(*code, &all, &plain)).collect();
         let worse = class(&apart) > class(&plain) && more.is_empty();
-        if !less.is_empty() || !unexplained.is_empty() || worse || class(&apart) < class(&plain) {
+        // Behind what is refused anyway the one goes on where the other does not.
+        let misses = !less.is_empty() && class(&apart) < 2;
+        if misses || !unexplained.is_empty() || worse || class(&apart) < class(&plain) {
             let verdicts = [&plain, &apart].map(|report| report.verdict.text());
-            wrong.push(format!(
-                "{}, of {stops} stops: less {less:#?}, more {more:#?}, {verdicts:?} {all:?} {those:?}",
-                seed - 1
-            ));
+            wrong.push(format!("{}, of {stops} stops: less {less:#?}, more {more:#?}, {verdicts:?}", seed - 1));
         }
     }
     assert!(wrong.is_empty(), "{} of {compared} differ: {}", wrong.len(), wrong.join("\n"));
