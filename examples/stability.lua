@@ -8,6 +8,7 @@ local delay = param("delay", 0.005)     -- one way, s
 local law   = param("law", "position")  -- or tank
 local Ba    = param("damping", 2)       -- N s/m
 local friction = param("friction", 0.1) -- of the joints, as a share of the nominal one
+local rule  = param("rule", 0)          -- damping per stiffness and delay, where that is more; 1.2: as the coupling has it
 
 assert(law == "position" or law == "tank", "`law` is position or tank")
 deploy(law == "tank" and "tank/coupling.yaml" or "../deployments/youbot_coupling.yaml")
@@ -24,6 +25,7 @@ for _, robot in ipairs(ROBOTS) do wait_state(robot .. ":copying", 20) end
 for _, robot in ipairs(ROBOTS) do raise(robot .. "/e_5dof") end
 of_both("Cart_Impedance.damping_rel", 0)
 of_both("Cart_Impedance.damping_abs", Ba)
+of_both("Cart_Impedance.delay_damping", rule)
 of_both("Cart_Impedance.stiffness", K)
 for number = 1, 2 do set("World.robot" .. number .. "_friction_scale", friction, { force = true, within = 1 }) end
 of_both("Dynamics.friction_comp", 0.9 * friction)

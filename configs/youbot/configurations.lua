@@ -64,6 +64,7 @@ ConfiguratorConf {
     connect("Cart_Impedance.engaged",        "Dynamics.engaged"),
     connect("youbot.jointstate",             "Dynamics.jointstate"),
     connect("youbot.odometry",               "Dynamics.odometry"),
+    connect("youbot.identified",             "Dynamics.identified"),
     connect("Arm_Kinematics.jacobian",       "Dynamics.jacobian"),
     connect("Dynamics.joint_effort_command", "youbot.joint_effort_command"),
     connect("Dynamics.base_twist",           "Base_Ctrl.base_twist"),
@@ -151,7 +152,7 @@ ConfiguratorConf {
     property_set("Cart_Impedance.stiffness", 150.0), property_set("Cart_Impedance.damping_abs", 5.0) },
   profile_stiff  = Configuration { group = "profile",
     property_set("Cart_Impedance.stiffness", 300.0), property_set("Cart_Impedance.damping_abs", 7.0) },
-  -- For a link of up to 100 ms: damping of 1.2 times stiffness times delay keeps the coupling stable.
+  -- Damping for a link of up to 100 ms before it is so slow: the controller follows what it sees by itself (delay_damping).
   profile_slow_link = Configuration { group = "profile",
     property_set("Cart_Impedance.stiffness", 150.0), property_set("Cart_Impedance.damping_abs", 18.0) },
 
@@ -241,6 +242,7 @@ ConfiguratorConf {
     disconnect("Cart_Impedance.engaged",        "Dynamics.engaged"),
     disconnect("youbot.jointstate",             "Dynamics.jointstate"),
     disconnect("youbot.odometry",               "Dynamics.odometry"),
+    disconnect("youbot.identified",             "Dynamics.identified"),
     disconnect("Arm_Kinematics.jacobian",       "Dynamics.jacobian"),
     disconnect("Dynamics.joint_effort_command", "youbot.joint_effort_command"),
     disconnect("Dynamics.base_twist",           "Base_Ctrl.base_twist"),

@@ -26,8 +26,6 @@ end
 local worst = { given = 0, least = math.huge, left = 0 }
 for _, delay in ipairs{ 0.005, 0.02, 0.05 } do
   for _, net in ipairs{ "To_Right", "To_Left" } do set(net .. ".delay", delay, { force = true, within = 1 }) end
-  -- Damping of 1.2 times stiffness times delay, as the profile for a slow link has it.
-  if delay == 0.05 then for _, robot in ipairs{ "left", "right" } do apply(robot .. "/profile_slow_link", { force = true }) end end
   hand("left", "align 8; free 600")
   hand("right", "align 8; free 600")
   wait_state("left:copying", 20)

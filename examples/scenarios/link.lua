@@ -78,11 +78,14 @@ until_both("five_DOF_mode", 0.1)
 both("e_8dof")
 wait(5)
 until_both("five_DOF_mode", 0)
+-- The damper on the own velocity follows the delay by itself: 1.2 times stiffness times delay.
+expect{ name = "50 ms: damping", value = math.min(signal("left/Cart_Impedance.damping"), signal("right/Cart_Impedance.damping")), min = 9, unit = "N s/m" }
 heal()
 until_both("five_DOF_mode.free", 5)
 wait(1)
 until_both("five_DOF_mode.free", 0)
 s:stop()
+expect{ name = "healed: damping", value = math.max(signal("left/Cart_Impedance.damping"), signal("right/Cart_Impedance.damping")), max = 5, unit = "N s/m" }
 expect{ name = "50 ms: copying", value = 100 * math.min(s:mean("left/Cart_Impedance.active"), s:mean("right/Cart_Impedance.active")), min = 100, unit = "%" }
 both("e_8dof")
 until_both("eight_DOF_mode", 0.01)

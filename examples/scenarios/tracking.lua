@@ -2,7 +2,7 @@
 --
 -- 42 mm to and fro in both directions (60 mm), 0.15 Hz, in eight degrees of freedom and in five, 150 and 300 N/m; then 40 cm away and back.
 -- How long of it the robots copied is told of both: the less of the two.
---   --set seconds=20 --set delay=0.02    one way, in s
+--   --set seconds=20 --set delay=0.01    one way, in s; from 15 ms on they would not begin to couple
 
 local seconds, delay = param("seconds", 60), param("delay", 0.005)
 deploy("../../deployments/youbot_coupling.yaml")

@@ -53,15 +53,19 @@ for number = 0, pairs_drawn do
   raise("e_shutdown")
   wait_state("pair:idle", 40)
   raise("e_start")
-  until_both("operational", 10)
+  -- As they are from before they move: while it unfolds a driver finds out what its arm weighs and how much it rubs.
   for _, robot in ipairs(ROBOTS) do
-    tune(robot .. "/youbot.encoders", true)
-    tune(robot .. "/youbot.heat_limit", true)
+    wait_state(robot .. ":calibrating", 5)
     local mass, friction, lag = drawn(0.9, 1.1), drawn(0.7, 1.3), drawn(0.001, 0.002)
     if number == 0 then mass, friction, lag = 1, 1, 0.0015 end
     tune(WORLD[robot] .. "mass_scale", mass)
     tune(WORLD[robot] .. "friction_scale", friction)
     tune(WORLD[robot] .. "torque_lag", lag)
+  end
+  until_both("operational", 10)
+  for _, robot in ipairs(ROBOTS) do
+    tune(robot .. "/youbot.encoders", true)
+    tune(robot .. "/youbot.heat_limit", true)
   end
   for _, mode in ipairs(MODES) do
     hand("align 8; free 600")

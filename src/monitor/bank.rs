@@ -84,7 +84,12 @@ impl InputSample {
 
     /// Whether something else is there now.
     fn differs(&self, other: &Self) -> bool {
-        self.present != other.present || self.writes != other.writes || self.value.to_bits() != other.value.to_bits()
+        self.writes != other.writes || self.holds_other_than(other)
+    }
+
+    /// Whether what is there now is another value: written once more, the same is the same.
+    fn holds_other_than(&self, other: &Self) -> bool {
+        self.present != other.present || self.value.to_bits() != other.value.to_bits()
     }
 }
 
@@ -120,6 +125,8 @@ struct WatchedMonitor {
     held: Box<[InputSample]>,
     /// Which of them are ports, whose samples tell their instant.
     stamped: Box<[bool]>,
+    /// Of which it matters that they were written, whatever it was.
+    counted: Box<[bool]>,
     raise: Option<EventName>,
     cleared: Option<EventName>,
     repeat: Option<Duration>,
@@ -170,6 +177,7 @@ impl Bank {
         let watches = monitors.iter().map(|monitor| {
             let (program, own) = compile(&monitor.when, pieces);
             let stamped = own.iter().map(|input| matches!(input, (MonitorInput::Port(_), _))).collect();
+            let counted = (0..own.len()).map(|slot| program.counts(slot)).collect();
             let slots: Box<[usize]> = own
                 .into_iter()
                 .map(|(input, matters)| {
@@ -187,6 +195,7 @@ impl Bank {
                 held: vec![InputSample::default(); slots.len()].into(),
                 slots,
                 stamped,
+                counted,
                 raise: monitor.raise,
                 cleared: monitor.cleared,
                 repeat: monitor.repeat,
@@ -342,7 +351,7 @@ impl WatchedMonitor {
                 self.tick = Time(first.saturating_add(period.saturating_mul(missed + 1)));
             }
             Sampling::OnSample => {
-                let changed = self.slots.iter().zip(&self.held).any(|(slot, held)| samples[*slot].differs(held));
+                let changed = self.slots.iter().enumerate().any(|(i, slot)| self.is_news(i, &samples[*slot]));
                 if !new && !changed && now < time_of(self.program.next()).min(self.again) {
                     return;
                 }
@@ -373,10 +382,15 @@ impl WatchedMonitor {
                 }
             }
         }
+        let news = new || (0..self.slots.len()).any(|i| self.is_news(i, &samples[self.slots[i]]));
         for (held, slot) in self.held.iter_mut().zip(&self.slots) {
             *held = samples[*slot];
         }
-        self.program.evaluate(target, &self.held);
+        // All that came is taken in already, at the instants at which it came, and nothing changes by itself up to now.
+        match news || self.program.next() <= target {
+            true => _ = self.program.evaluate(target, &self.held),
+            false => self.program.go_on(target),
+        }
         if self.verdict == Some(true) && !self.program.grade().holds {
             // What was due before it ended was due.
             self.repeat(Time(now.as_nanos().saturating_sub(1)), raise);
@@ -385,9 +399,14 @@ impl WatchedMonitor {
         self.repeat(now, raise);
     }
 
+    /// Whether the condition may be another for that sample.
+    fn is_news(&self, i: usize, sample: &InputSample) -> bool {
+        if self.counted[i] { sample.differs(&self.held[i]) } else { sample.holds_other_than(&self.held[i]) }
+    }
+
     /// The position from which a sample counts that is not held yet: its own instant, but after the last look.
     fn arrival(&self, looked: u64, i: usize, sample: &InputSample) -> Option<u64> {
-        let news = self.stamped[i] && sample.present && sample.differs(&self.held[i]);
+        let news = self.stamped[i] && sample.present && self.is_news(i, sample);
         news.then(|| sample.at.as_nanos().saturating_mul(2).max(looked.max(self.program.position()) + 1))
     }
 

@@ -73,9 +73,20 @@ impl CompiledCondition {
         self.grade()
     }
 
+    /// Nothing has changed up to `position`, which is before [`Self::next`].
+    pub fn go_on(&mut self, position: u64) {
+        self.position = position;
+    }
+
     /// What the condition was when last evaluated.
     pub fn grade(&self) -> Grade {
         self.grades.last().copied().unwrap_or(Grade::BOTTOM)
+    }
+
+    /// Whether it matters when, or how often, an input was written.
+    pub fn counts(&self, input: usize) -> bool {
+        self.numbers.iter().any(|number| matches!(number, Number::Rate(slot, _) if *slot == input))
+            || self.truths.iter().any(|truth| matches!(truth, TruthNode::Age { slot, .. } if *slot == input))
     }
 
     /// The position it was last evaluated at.

@@ -4,6 +4,8 @@
 use davit::time::Clock;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use std::time::Duration;
 
 /// A change of one place.
@@ -262,19 +264,50 @@ fn mutations_are_noticed() {
     let only = std::env::var("DAVIT_MUTATION").unwrap_or_default();
     let all: Vec<(Mutation, usize)> =
         mutations().into_iter().zip(1..).filter(|(m, _)| m.name.contains(&only)).collect();
-    let clock = Clock::real();
-    let mut sound: Vec<Noticed> = Vec::new();
-    let mut survived = Vec::new();
-    for (mutation, number) in all {
-        if !sound.contains(&mutation.by) {
-            assert!(passes(&at, &tests, &mutation.by, 0), "what must notice `{}` fails without it", mutation.name);
-            sound.push(mutation.by.clone());
+    // What must notice a change passes without it; each of them once, before any change.
+    let mut sound: Vec<(&Mutation, usize)> = Vec::new();
+    for (mutation, _) in &all {
+        if !sound.iter().any(|(known, _)| known.by == mutation.by) {
+            sound.push((mutation, 0));
         }
-        let begun = clock.now();
-        let survives = passes(&at, &tests, &mutation.by, number);
-        let told = if survives { "survived" } else { "noticed" };
-        println!("{told:<10}{:>6.1} s  {}", clock.now().since(begun).as_secs_f64(), mutation.name);
-        survived.extend(survives.then_some(mutation.name));
     }
+    let failed = survivors(&sound, |passed| !passed, &at, &tests);
+    assert!(failed.is_empty(), "what must notice these fails without them: {failed:?}");
+    let changed: Vec<(&Mutation, usize)> = all.iter().map(|(mutation, number)| (mutation, *number)).collect();
+    let survived = survivors(&changed, |passed| passed, &at, &tests);
     assert!(survived.is_empty(), "not noticed: {survived:?}");
+}
+
+/// Runs the tests with each of the changes, as many at a time as the machine has cores; the names of those `wrong` with which they pass or not.
+fn survivors(
+    changes: &[(&Mutation, usize)],
+    wrong: impl Fn(bool) -> bool + Sync,
+    at: &Path,
+    tests: &[PathBuf; 2],
+) -> Vec<String> {
+    let (next, names) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
+    let run = || {
+        let clock = Clock::real();
+        while let Some((mutation, number)) = changes.get(next.fetch_add(1, Relaxed)) {
+            let begun = clock.now();
+            let passed = passes(at, tests, &mutation.by, *number);
+            let told = match (number, passed) {
+                (0, true) => "unchanged",
+                (0, false) => "fails",
+                (_, true) => "survived",
+                (_, false) => "noticed",
+            };
+            println!("{told:<10}{:>6.1} s  {}", clock.now().since(begun).as_secs_f64(), mutation.name);
+            if wrong(passed) {
+                names.lock().unwrap().push(mutation.name.clone());
+            }
+        }
+    };
+    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    std::thread::scope(|scope| {
+        for _ in 0..cores {
+            scope.spawn(run);
+        }
+    });
+    names.into_inner().unwrap()
 }

@@ -3,7 +3,7 @@
 use davit::app;
 use davit::lang::LoadOptions;
 use davit::libraries;
-use davit::model::EventName;
+use davit::model::{Ask, ConfigId, EventName};
 use davit::session::{Happening, Session, Stage};
 use davit::time::{Clock, Time};
 use std::path::Path;
@@ -106,7 +106,6 @@ fn both_come_up_side_by_side_and_couple() {
 fn what_one_does_delays_nothing_of_the_other() {
     up("youbot_coupling.yaml", |both| {
         both.wait_for(&["left:copying", "right:copying"], 20.0);
-        // A mode of one is begun and answered while the other one parks, which takes seconds.
         both.raise("left/e_5dof");
         both.wait(0.0);
         both.wait_for(&["left:five_DOF_mode"], 0.002);
@@ -120,6 +119,44 @@ fn what_one_does_delays_nothing_of_the_other() {
         assert!(both.is("left:operational") && both.is("right:fault"), "{:?}", both.session.hub().active());
         both.raise("right/e_reset");
         both.wait_for(&["left:copying", "right:copying"], 10.0);
+    });
+}
+
+/// Parking takes seconds; what an operator asks of one robot meanwhile is answered at the instant it is asked.
+#[test]
+fn what_is_asked_of_one_begins_at_once_while_the_other_one_parks() {
+    up("youbot_coupling.yaml", |both| {
+        both.wait_for(&["left:copying", "right:copying"], 20.0);
+        let begun = both.clock.now();
+        both.raise("e_shutdown");
+        both.wait_for(&["left:parking", "right:parking"], 1.0);
+        both.wait(1.0);
+        for robot in ["left", "right"] {
+            let tuned = ConfigId::new(&format!("{robot}/profile_stiff")).unwrap();
+            both.session.request(Ask::Apply(tuned), "operator", true);
+        }
+        both.wait(1.0);
+        assert!(both.is("left:parking") && both.is("right:parking"), "{:?}", both.session.hub().active());
+        both.wait_for(&["pair:idle"], 10.0);
+        let heard: Vec<_> = both.heard.lock().unwrap().iter().filter(|(at, _)| *at >= begun).cloned().collect();
+        // What was asked, and how long its answer took.
+        let asked = heard.iter().filter_map(|(at, happening)| match happening {
+            Happening::Requested { request: Some(request), ask, .. } => Some((*request, *at, ask.clone())),
+            _ => None,
+        });
+        let took: Vec<(String, f64)> = asked
+            .map(|(request, at, ask)| {
+                let of = |it: &Happening| matches!(it, Happening::Answered(told) if told.request == request);
+                let answer = heard.iter().find(|(_, it)| of(it));
+                (ask, seconds(answer.expect("it is answered").0) - seconds(at))
+            })
+            .collect();
+        let of = |wanted: &str| -> Vec<f64> {
+            took.iter().filter(|(ask, _)| ask.contains(wanted)).map(|(_, took)| *took).collect()
+        };
+        assert_eq!((of("left/profile_stiff"), of("right/profile_stiff")), (vec![0.0], vec![0.0]), "{took:?}");
+        assert!(of("left/park").iter().chain(&of("right/park")).all(|parked| *parked > 3.0), "{took:?}");
+        assert!(!of("left/park").is_empty() && !of("right/park").is_empty(), "{took:?}");
     });
 }
 

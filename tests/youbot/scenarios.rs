@@ -8,7 +8,8 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Each with what is set for it here: what takes a minute in the file is shorter.
-const SCENARIOS: [(&str, &[(&str, &str)]); 30] = [
+const SCENARIOS: [(&str, &[(&str, &str)]); 31] = [
+    ("beside", &[]),
     ("blocked", &[]),
     ("bring_up", &[]),
     ("configurator", &[]),
@@ -82,6 +83,11 @@ fn every_scenario_is_run() {
         std::fs::read_dir(folder()).unwrap().map(|file| file.unwrap().file_name().into_string().unwrap()).collect();
     let listed: BTreeSet<String> = SCENARIOS.iter().map(|(name, _)| format!("{name}.lua")).collect();
     assert_eq!(files, listed);
+}
+
+#[test]
+fn beside() {
+    run("beside");
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 use super::base::Twist2;
 use super::handover::{Handover, ramped, within_speed};
+use super::identification::{ArmScales, Identification};
 use super::parameters::{
     COULOMB, GRIPPER, JOINTS, PARK_POSE_DEG, RANGE_LOWER_DEG, RANGE_UPPER_DEG, TORQUE_LIMIT, WORKING_POSE_DEG,
 };
@@ -155,6 +156,9 @@ pub struct Drives {
     base_watched: bool,
     /// A joint gave all that position control may in the last update.
     presses: bool,
+    /// What the motion under way tells of the arm, and what the last one that did has told.
+    identification: Identification,
+    identified: Option<ArmScales>,
 }
 
 impl Drives {
@@ -180,7 +184,14 @@ impl Drives {
             outside: false,
             base_watched: false,
             presses: false,
+            identification: Identification::default(),
+            identified: None,
         }
+    }
+
+    /// How the arm differs from what it is meant to be, as the last motion from or onto the stops has told.
+    pub fn identified(&self) -> Option<ArmScales> {
+        self.identified
     }
 
     /// What they do.

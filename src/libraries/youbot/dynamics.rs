@@ -2,6 +2,7 @@
 
 use super::base::Twist2;
 use super::handover::TORQUE_SLEW;
+use super::identification::ArmScales;
 use super::impedance::{ENGAGE, FADE};
 use super::parameters::{COULOMB, FRICTION_SLOPE, JOINTS, TORQUE_LIMIT, WORKING_POSE_DEG};
 use super::plant::joint_ranges;
@@ -72,8 +73,10 @@ const COUNTER_SPEED: f64 = 0.01;
 /// How the recentring sets out once the base yields, in m/s²: a base that went off at once for what is centimetres off would drive
 /// the arm's joints faster than a push does, with nobody touching anything.
 const SETTING_OUT: f64 = 0.4;
-/// Joints slower than that stick, in rad/s, and a base that is slower than that, in m/s and rad/s, stands.
+/// Joints slower than that stick, in rad/s.
 const STILL: f64 = 1e-3;
+/// A base that is slower than that stands, in m/s and rad/s. Two bases that go by fits and starts, since what pulls them is next to nothing, do not.
+const STANDS: f64 = 1e-4;
 /// Joints that are faster than that are moved by somebody, in rad/s.
 const LED: f64 = 0.01;
 /// For how long a base goes on that carries an arm along whose joints stick, in s.
@@ -86,6 +89,8 @@ const COUNTER_SLOPE: f64 = 0.03;
 pub struct Dynamics {
     /// The arm as the controller believes it to be.
     pub model: ArmModel,
+    /// Its friction, as a multiple of the nominal one.
+    pub friction: f64,
     /// Its parameters.
     pub parameters: DynamicsParameters,
     /// Torque of the coupling (force and posture), in N m: whoever stops asking for it suddenly, it goes along a ramp.
@@ -141,6 +146,7 @@ impl Dynamics {
         let (coupling, pull) = (J5::zeros(), J5::zeros());
         Self {
             model,
+            friction: 1.0,
             parameters: DynamicsParameters::default(),
             coupling,
             pull,
@@ -148,6 +154,17 @@ impl Dynamics {
             yielding: 0.0,
             carried: 0.0,
         }
+    }
+
+    /// From now on it is believed to be so, and to carry `payload` kg.
+    pub fn believe(&mut self, arm: ArmScales, payload: f64) {
+        self.model = ArmModel::youbot(payload, arm.mass);
+        self.friction = arm.friction;
+    }
+
+    /// Coulomb friction of a joint, in N m.
+    fn coulomb(&self, i: usize) -> f64 {
+        COULOMB[i] * self.friction
     }
 
     /// One step of `dt` seconds. `moves`: how the base does, in its frame. `coupled`: what the coupling wants; none: nothing, or
@@ -173,8 +190,8 @@ impl Dynamics {
         for i in 0..JOINTS {
             // Who is pulled is helped out of sticking, too, by what the pull is beside the joint's friction. That puts no energy into
             // the arm, whatever the delay: the compensation never is more than the friction that takes it.
-            let along = qd[i] / FRICTION_SLOPE + p.stiction_comp * self.pull[i] / COULOMB[i];
-            torque[i] += p.friction_comp * COULOMB[i] * along.tanh();
+            let along = qd[i] / FRICTION_SLOPE + p.stiction_comp * self.pull[i] / self.coulomb(i);
+            torque[i] += p.friction_comp * self.coulomb(i) * along.tanh();
         }
         let (mut twist, mut coupling) = (Twist2::default(), J5::zeros());
         self.mutual = (self.mutual + if mutual { dt / ENGAGE } else { -dt / FADE }).clamp(0.0, 1.0);
@@ -182,7 +199,7 @@ impl Dynamics {
         self.yielding = if yields { self.yielding + dt } else { 0.0 };
         self.carried = match qd.amax() {
             led if led > LED => 0.0,
-            still if still < STILL && moves.vx.hypot(moves.vy).max(moves.wz.abs()) > STILL => self.carried + dt,
+            still if still < STILL && moves.vx.hypot(moves.vy).max(moves.wz.abs()) > STANDS => self.carried + dt,
             _ => self.carried,
         };
         // What sticks is not where the tool is wanted and does not come nearer: the base would drive on for ever, with nobody
@@ -235,7 +252,7 @@ impl Dynamics {
     fn counter_torque(&self, tool: &ToolSpace, home: &Vector3<f64>, qd: &J5) -> J5 {
         let speeds = -tool.joints(home);
         let share = self.parameters.friction_comp * (home.norm() / COUNTER_SPEED).min(1.0);
-        J5::from_fn(|i, _| share * COULOMB[i] * ((speeds[i] - qd[i]) / COUNTER_SLOPE).tanh())
+        J5::from_fn(|i, _| share * self.coulomb(i) * ((speeds[i] - qd[i]) / COUNTER_SLOPE).tanh())
     }
 
     /// Forgets the past.
@@ -252,7 +269,7 @@ mod tests {
     use super::super::tool_space::LEFT_BEHIND;
     use super::*;
 
-    const STANDS: Twist2 = Twist2 { vx: 0.0, vy: 0.0, wz: 0.0 };
+    const AT_REST: Twist2 = Twist2 { vx: 0.0, vy: 0.0, wz: 0.0 };
 
     #[test]
     fn the_posture_does_not_push_the_tool() {
@@ -276,15 +293,15 @@ mod tests {
         let tool = Tool::of(&model, &q, &J5::zeros(), Default::default(), Default::default());
         let pull = Coupled { force: Vector3::new(2.0, 0.0, 0.0), engaged: 1.0, peer_yields: true };
         for coupled in [None, Some(Coupled { engaged: 0.0, ..pull })] {
-            let out = law.update(&q, &J5::zeros(), &tool.jacobian, STANDS, coupled.as_ref(), 0.001);
+            let out = law.update(&q, &J5::zeros(), &tool.jacobian(), AT_REST, coupled.as_ref(), 0.001);
             assert_eq!(out.torque, model.gravity(&model.posture(&q)));
             assert_eq!(out.twist, Twist2::default());
         }
         law.parameters.r_nominal = [at_tool(&model, &q).x, at_tool(&model, &q).y];
-        let along = Twist2 { vx: 0.3, ..STANDS };
+        let along = Twist2 { vx: 0.3, ..AT_REST };
         let mut moves = |peer_yields: bool| {
             let pull = Coupled { peer_yields, ..pull };
-            let update = |_| law.update(&q, &J5::zeros(), &tool.jacobian, along, Some(&pull), 0.001).twist;
+            let update = |_| law.update(&q, &J5::zeros(), &tool.jacobian(), along, Some(&pull), 0.001).twist;
             (0..301).map(update).last().expect("updates")
         };
         assert_eq!(moves(false), Twist2::default(), "the other base stands");
@@ -308,7 +325,7 @@ mod tests {
         let led = J5::from([0.0, 0.0, 0.0, 0.0, 2.0 * LED]);
         let mut last = 0.0;
         for tick in 1..=6000 {
-            let twist = law.update(&q, &led, &tool.jacobian, ahead, Some(&rest), 0.001).twist;
+            let twist = law.update(&q, &led, &tool.jacobian(), ahead, Some(&rest), 0.001).twist;
             let speed = twist.vx.hypot(twist.vy);
             let most = SETTING_OUT * f64::from(tick) * 0.001;
             assert!(speed <= most + 1e-9 && speed >= last - 1e-9, "{speed} after {tick} ms");
@@ -316,8 +333,8 @@ mod tests {
         }
         assert!((last - law.parameters.recenter_gain * off.norm()).abs() < 1e-6, "in the end all of it: {last}");
         // Once more from where it is.
-        law.update(&q, &J5::zeros(), &tool.jacobian, ahead, None, 1.0);
-        let again = law.update(&q, &led, &tool.jacobian, ahead, Some(&rest), 0.001).twist;
+        law.update(&q, &J5::zeros(), &tool.jacobian(), ahead, None, 1.0);
+        let again = law.update(&q, &led, &tool.jacobian(), ahead, Some(&rest), 0.001).twist;
         assert!(again.vx.hypot(again.vy) < 1e-3, "{again:?}");
     }
 
@@ -330,16 +347,16 @@ mod tests {
         let tool = Tool::of(&model, &q, &J5::zeros(), Default::default(), Default::default());
         let pull = Coupled { force: Vector3::new(0.3, 0.0, 0.0), engaged: 1.0, peer_yields: true };
         let mut after = |seconds: f64, speed: f64, moves: Twist2| {
-            let update = |_| law.update(&q, &J5::repeat(speed), &tool.jacobian, moves, Some(&pull), 0.001).twist;
+            let update = |_| law.update(&q, &J5::repeat(speed), &tool.jacobian(), moves, Some(&pull), 0.001).twist;
             (0..(seconds * 1e3) as usize).map(update).last().expect("updates")
         };
-        let along = Twist2 { vx: 0.02, ..STANDS };
-        assert_ne!(after(0.9, 0.0, along), STANDS);
-        assert_eq!(after(0.2, 0.0, along), STANDS, "nobody moves the arm");
-        assert_eq!(after(5.0, 0.0, STANDS), STANDS);
-        assert_ne!(after(0.1, 0.02, STANDS), STANDS, "somebody does");
-        assert_ne!(after(5.0, 0.0, STANDS), STANDS, "it has not set out yet");
-        assert_ne!(after(5.0, 0.02, along), STANDS, "it follows");
+        let along = Twist2 { vx: 0.02, ..AT_REST };
+        assert_ne!(after(0.9, 0.0, along), AT_REST);
+        assert_eq!(after(0.2, 0.0, along), AT_REST, "nobody moves the arm");
+        assert_eq!(after(5.0, 0.0, AT_REST), AT_REST);
+        assert_ne!(after(0.1, 0.02, AT_REST), AT_REST, "somebody does");
+        assert_ne!(after(5.0, 0.0, AT_REST), AT_REST, "it has not set out yet");
+        assert_ne!(after(5.0, 0.02, along), AT_REST, "it follows");
     }
 
     #[test]
@@ -356,18 +373,18 @@ mod tests {
         for (q, force) in cases {
             let q = radians(q);
             let tool = Tool::of(&model, &q, &J5::zeros(), Default::default(), Default::default());
-            let base = tool.jacobian.fixed_columns::<3>(0).into_owned();
+            let base = tool.jacobian().fixed_columns::<3>(0).into_owned();
             let space =
-                ToolSpace::of(&model, &model.posture(&q), &tool.jacobian.fixed_columns::<JOINTS>(3).into_owned())
+                ToolSpace::of(&model, &model.posture(&q), &tool.jacobian().fixed_columns::<JOINTS>(3).into_owned())
                     .unwrap();
             let pull = Coupled { force: Vector3::from(force), engaged: 1.0, peer_yields: true };
             let mut after = |moves: Twist2| {
                 law.reset();
-                let update = |_| law.update(&q, &J5::zeros(), &tool.jacobian, moves, Some(&pull), 0.001).twist;
+                let update = |_| law.update(&q, &J5::zeros(), &tool.jacobian(), moves, Some(&pull), 0.001).twist;
                 (0..900).map(update).last().expect("updates")
             };
             let asked = |wanted: Twist2| space.joints(&(base * Vector3::new(wanted.vx, wanted.vy, wanted.wz))).amax();
-            let stands = after(STANDS);
+            let stands = after(AT_REST);
             assert!((asked(stands) - LEFT_BEHIND).abs() < 1e-3, "{stands:?} asks for {} rad/s", asked(stands));
             // Carried along it may be as fast as it was meant to be, and in the same direction.
             let carried = after(Twist2 { vx: stands.vx * 20.0, vy: stands.vy * 20.0, wz: stands.wz * 20.0 });
@@ -391,7 +408,7 @@ mod tests {
         let (mut last, mut most) = (alone, 0.0_f64);
         for tick in 0..400 {
             let coupled = (tick < 200).then_some(&pull);
-            let out = law.update(&q, &J5::zeros(), &tool.jacobian, STANDS, coupled, 0.001);
+            let out = law.update(&q, &J5::zeros(), &tool.jacobian(), AT_REST, coupled, 0.001);
             // The force's own, and the friction compensation's for its sake.
             let bound = 0.2 * (1.0 + law.parameters.friction_comp * law.parameters.stiction_comp);
             assert!((out.torque - last).amax() <= bound + 1e-9, "{last} {}", out.torque);
@@ -406,14 +423,14 @@ mod tests {
         let model = ArmModel::youbot(0.219, 1.0);
         let q = radians([0.0, -30.0, 100.0, 60.0, 0.0]);
         let tool = Tool::of(&model, &q, &J5::zeros(), Default::default(), Default::default());
-        let arm: Jacobian = tool.jacobian.fixed_columns::<JOINTS>(3).into_owned();
+        let arm: Jacobian = tool.jacobian().fixed_columns::<JOINTS>(3).into_owned();
         let carried = model.gravity(&model.posture(&q)) + soft_limits(&q, 80.0);
         for (force, qd) in [(1.0, 0.0), (8.0, 0.0), (8.0, 1.0), (8.0, -1.0), (-8.0, 0.02)] {
             let (pull, qd) = (Vector3::new(force, -0.5 * force, 0.3 * force), J5::repeat(qd));
             let mut law = Dynamics::new(model.clone());
             (law.parameters.posture_stiffness, law.parameters.posture_damping) = (0.0, 0.0);
             let coupled = Coupled { force: pull, engaged: 1.0, peer_yields: true };
-            let update = |_| law.update(&q, &qd, &tool.jacobian, STANDS, Some(&coupled), 0.001).torque;
+            let update = |_| law.update(&q, &qd, &tool.jacobian(), AT_REST, Some(&coupled), 0.001).torque;
             let torque = (0..200).map(update).last().expect("updates");
             let (own, share) = (arm.tr_mul(&pull), law.parameters.friction_comp);
             let steep = law.parameters.stiction_comp;

@@ -24,7 +24,7 @@ pub struct Reference {
 /// How the spring and the damper are kept from giving out more energy than they take in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum CouplingLaw {
-    /// Not at all: delayed, it takes damping of 1.2 times stiffness times delay to be stable.
+    /// Not at all: delayed, it takes damping of [`DELAY_DAMPING`] times stiffness times delay to be stable.
     #[default]
     Position,
     /// By a tank of energy at each end, whatever the delay.
@@ -51,8 +51,11 @@ pub struct ImpedanceParameters {
     pub stiffness: f64,
     /// On the difference of velocities, in N s/m.
     pub damping_rel: f64,
-    /// On the tool's own velocity, in N s/m; at least 1.2 times stiffness times delay keeps a delayed coupling stable.
+    /// On the tool's own velocity, in N s/m, at least.
     pub damping_abs: f64,
+    /// So much times stiffness times delay it is where that is more ([`DELAY_DAMPING`] keeps a delayed coupling stable; 0: never). The tank
+    /// needs none of it.
+    pub delay_damping: f64,
     /// Largest force put out, in N.
     pub f_max: f64,
     /// Fastest change of the force put out, in N/s.
@@ -70,6 +73,7 @@ impl Default for ImpedanceParameters {
             stiffness: 150.0,
             damping_rel: 12.0,
             damping_abs: 5.0,
+            delay_damping: 0.0,
             f_max: 10.0,
             f_rate: 40.0,
             ref_max_age: 0.06,
@@ -82,6 +86,10 @@ impl Default for ImpedanceParameters {
 pub const FADE: f64 = 0.1;
 /// Time in which it takes hold, in s.
 pub const ENGAGE: f64 = 0.3;
+/// Damping on the own velocity per stiffness and delay (youbot.md §3.2): 1 is what the delay takes, the rest is for what varies.
+pub const DELAY_DAMPING: f64 = 1.2;
+/// The delay is taken as the mean age of the reference over about so long, in s.
+const DELAY_TIME: f64 = 0.2;
 
 /// The law with its memory.
 #[derive(Debug, Clone, Default)]
@@ -91,6 +99,8 @@ pub struct Impedance {
     ramp: Vector3<f64>,
     trust: f64,
     share: f64,
+    /// How old the reference is on the average, in s.
+    delay: f64,
     tank: Tank,
 }
 
@@ -125,6 +135,9 @@ impl Impedance {
         let raw_norm = raw.norm();
         let coupled = coupled && reference.is_some_and(|r| r.coupled);
         let fresh = reference.is_some_and(|r| r.age <= p.ref_max_age);
+        // What is older is not believed, and pulls at nothing.
+        let age = reference.map_or(0.0, |r| r.age.clamp(0.0, p.ref_max_age));
+        self.delay += (age - self.delay) * dt / (DELAY_TIME + dt);
         self.trust = (self.trust + if fresh { dt / FADE } else { -dt / FADE }).clamp(0.0, 1.0);
         self.share = (self.share + if coupled { dt / ENGAGE } else { -dt / FADE }).clamp(0.0, 1.0);
         if self.share == 0.0 {
@@ -139,11 +152,20 @@ impl Impedance {
         let length = step.norm();
         self.ramp += if length > most { step * (most / length) } else { step };
         let engaged = self.share * self.trust;
-        let mut force = (self.ramp - velocity * p.damping_abs) * engaged;
+        let mut force = (self.ramp - velocity * self.damping()) * engaged;
         if p.law == CouplingLaw::Tank {
             force = self.tank.update(&force, position, velocity, reference.map(|r| r.energy), dt);
         }
         ImpedanceOutput { force, engaged, raw_norm }
+    }
+
+    /// The damper on the own velocity that the delay asks for now, in N s/m.
+    pub fn damping(&self) -> f64 {
+        let p = &self.parameters;
+        match p.law {
+            CouplingLaw::Position => p.damping_abs.max(p.delay_damping * p.stiffness * self.delay),
+            CouplingLaw::Tank => p.damping_abs,
+        }
     }
 
     /// Energy given to the other robot's coupling so far, in J.
@@ -156,6 +178,7 @@ impl Impedance {
         self.ramp = Vector3::zeros();
         self.trust = 0.0;
         self.share = 0.0;
+        self.delay = 0.0;
         self.tank = Tank::default();
     }
 }
@@ -202,6 +225,35 @@ mod tests {
             last = f;
         }
         assert!((last - 10.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn the_damping_follows_the_delay_without_a_step() {
+        let mut law = Impedance::default();
+        law.parameters.delay_damping = DELAY_DAMPING;
+        let fast = Vector3::new(0.0, 0.4, 0.0);
+        let (mut last, mut force) = (5.0, Vector3::zeros());
+        // Packets come every 4 ms; from 1 s on they are 50 ms under way, from 3 s on 5 ms again, and from 5 s on none come.
+        for tick in 0..6000 {
+            let (held, t) = (f64::from(tick % 4) * DT, f64::from(tick) * DT);
+            let age = match t {
+                t if t >= 5.0 => t - 5.0,
+                t if (1.0..3.0).contains(&t) => 0.05 + held,
+                _ => 0.005 + held,
+            };
+            let out = law.update(&Vector3::zeros(), &fast, Some(&away(age)), true, DT);
+            assert!(tick < 400 || (out.force - force).norm() < 0.15, "{tick} ms");
+            assert!((law.damping() - last).abs() < 0.1, "{} {last}", law.damping());
+            (last, force) = (law.damping(), out.force);
+            let least = DELAY_DAMPING * 150.0 * 0.05;
+            match tick {
+                0..1000 | 3800..5000 => assert_eq!(last, 5.0, "{tick} ms"),
+                2200..3000 => assert!(last >= least && last < 1.1 * least, "{tick} ms: {last}"),
+                _ => assert!(last <= 1.2 * least, "{tick} ms: {last}"),
+            }
+        }
+        law.parameters.law = CouplingLaw::Tank;
+        assert_eq!(law.damping(), 5.0);
     }
 
     #[test]

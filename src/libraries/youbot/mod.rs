@@ -7,6 +7,7 @@ pub mod drives;
 pub mod dynamics;
 pub mod hand;
 pub mod handover;
+pub mod identification;
 pub mod impedance;
 pub mod kinematics;
 pub mod link;

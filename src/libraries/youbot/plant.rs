@@ -3,7 +3,7 @@
 use super::base::{Pose2, Twist2};
 use super::parameters::{BASE_LAG, BASE_MOUNT, COULOMB, JOINTS, RANGE_LOWER_DEG, RANGE_UPPER_DEG, VISCOUS};
 use super::rigid_body::{ArmModel, BaseMotion, J5, M5, Posture, radians};
-use nalgebra::{Rotation3, Vector3};
+use nalgebra::{Matrix3, Rotation3, Vector3};
 
 /// Stiffness of the mechanical stops, in N m/rad (assumed: stiff, and slow enough for a step of 0.5 ms).
 const STOP_STIFFNESS: f64 = 3000.0;
@@ -106,7 +106,8 @@ fn with_friction(mass: &M5, momentum: &J5, most: &J5, guess: J5) -> J5 {
             if mass[(i, i)] <= 0.0 {
                 return J5::zeros();
             }
-            let left = momentum[i] - mass.row(i).transpose().dot(&v) + mass[(i, i)] * v[i];
+            // It is symmetric, and its columns lie together.
+            let left = momentum[i] - mass.column(i).dot(&v) + mass[(i, i)] * v[i];
             let next = (left - left.clamp(-most[i], most[i])) / mass[(i, i)];
             change = change.max((next - v[i]).abs());
             v[i] = next;
@@ -151,7 +152,8 @@ impl BasePlant {
 
 /// From the base's frame to the world.
 pub fn base_rotation(pose: Pose2) -> Rotation3<f64> {
-    Rotation3::from_axis_angle(&Vector3::z_axis(), pose.th)
+    let (sin, cos) = pose.th.sin_cos();
+    Rotation3::from_matrix_unchecked(Matrix3::new(cos, -sin, 0.0, sin, cos, 0.0, 0.0, 0.0, 1.0))
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@
 use super::parameters::{
     ArmLink, BASE_MOUNT, GRAVITY, GRIPPER, JOINT_AXIS, JOINT_ORIGIN, JOINTS, LINKS, REFLECTED_INERTIA, TOOL_OFFSET,
 };
-use nalgebra::{Matrix3, Rotation3, SMatrix, SVector, Unit, Vector3};
+use nalgebra::{Matrix3, Rotation3, SMatrix, SVector, Vector3};
 
 /// Five joint values: angles in rad, speeds in rad/s, torques in N m.
 pub type J5 = SVector<f64, JOINTS>;
@@ -24,7 +24,8 @@ pub struct ArmModel {
     links: [RigidBody; JOINTS],
     /// From one joint to the next, in the previous link's frame.
     offsets: [Vector3<f64>; JOINTS],
-    axes: [Unit<Vector3<f64>>; JOINTS],
+    /// Which axis of its frame each joint turns about, and which way (1 or -1).
+    axes: [(usize, f64); JOINTS],
     /// The tool point in the frame of joint 5, in m.
     pub tool: Vector3<f64>,
     /// The arm's base frame in the mobile base's, in m.
@@ -68,6 +69,29 @@ impl RigidBody {
     }
 }
 
+/// A body about the origin of the base's frame: of several as one it is the sum.
+#[derive(Debug, Clone, Copy)]
+struct Inertia {
+    mass: f64,
+    /// Mass by centre of mass, in kg m.
+    moment: Vector3<f64>,
+    /// In kg m².
+    about: Matrix3<f64>,
+}
+
+impl Inertia {
+    fn none() -> Self {
+        Self { mass: 0.0, moment: Vector3::zeros(), about: Matrix3::zeros() }
+    }
+
+    fn add(&mut self, body: &RigidBody) {
+        let (c, moment) = (&body.com, body.com * body.mass);
+        self.mass += body.mass;
+        self.moment += moment;
+        self.about += body.inertia + Matrix3::from_diagonal_element(c.dot(&moment)) - moment * c.transpose();
+    }
+}
+
 /// What the arm stands on is doing, in the arm's base frame.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct BaseMotion {
@@ -101,7 +125,10 @@ impl ArmModel {
         Self {
             links,
             offsets: JOINT_ORIGIN.map(Vector3::from),
-            axes: JOINT_AXIS.map(|a| Unit::new_normalize(Vector3::from(a))),
+            axes: JOINT_AXIS.map(|a| {
+                let along = Vector3::from(a).iamax();
+                (along, a[along])
+            }),
             tool: Vector3::from(TOOL_OFFSET),
             mount: Vector3::from(BASE_MOUNT),
             reflected: J5::from(REFLECTED_INERTIA),
@@ -116,12 +143,20 @@ impl ArmModel {
             axes: [Vector3::zeros(); JOINTS],
             tool: Vector3::zeros(),
         };
-        let mut rotation = Rotation3::identity();
+        let mut columns = Matrix3::identity();
         let mut origin = Vector3::zeros();
+        let mut rotation = Rotation3::identity();
         for i in 0..JOINTS {
-            origin += rotation * self.offsets[i];
-            out.axes[i] = rotation * self.axes[i].into_inner();
-            rotation *= Rotation3::from_axis_angle(&self.axes[i], q[i]);
+            origin += columns * self.offsets[i];
+            let (along, way) = self.axes[i];
+            out.axes[i] = columns.column(along) * way;
+            // About an axis of its own frame: that column stays, the other two turn in their plane.
+            let (sin, cos) = (q[i] * way).sin_cos();
+            let (a, b) = ((along + 1) % 3, (along + 2) % 3);
+            let (u, v) = (columns.column(a).into_owned(), columns.column(b).into_owned());
+            columns.set_column(a, &(u * cos + v * sin));
+            columns.set_column(b, &(v * cos - u * sin));
+            rotation = Rotation3::from_matrix_unchecked(columns);
             out.origins[i] = origin;
             out.rotations[i] = rotation;
         }
@@ -166,14 +201,16 @@ impl ArmModel {
 
     fn mass_matrix_of(bodies: &[RigidBody; JOINTS], at: &Posture) -> M5 {
         let mut out = M5::zeros();
-        let mut composite = RigidBody { mass: 0.0, com: Vector3::zeros(), inertia: Matrix3::zeros() };
+        let mut composite = Inertia::none();
+        // What is at the origin moves so where joint i alone turns at 1 rad/s.
+        let origins: [Vector3<f64>; JOINTS] = std::array::from_fn(|i| at.origins[i].cross(&at.axes[i]));
         for i in (0..JOINTS).rev() {
-            composite = bodies[i].join(composite);
-            // Wrench that accelerates joint i alone at 1 rad/s², about the composite body's centre of mass.
-            let force = at.axes[i].cross(&(composite.com - at.origins[i])) * composite.mass;
-            let torque = composite.inertia * at.axes[i];
+            composite.add(&bodies[i]);
+            // Momentum of all that joint i carries then, and its moment about the origin.
+            let momentum = origins[i] * composite.mass + at.axes[i].cross(&composite.moment);
+            let moment = composite.about * at.axes[i] + composite.moment.cross(&origins[i]);
             for j in 0..=i {
-                let value = at.axes[j].dot(&(torque + (composite.com - at.origins[j]).cross(&force)));
+                let value = at.axes[j].dot(&moment) + origins[j].dot(&momentum);
                 out[(i, j)] = value;
                 out[(j, i)] = value;
             }
@@ -203,7 +240,6 @@ impl ArmModel {
 
     /// Joint torques for the accelerations `qdd` at speeds `qd` (gravity, Coriolis and centrifugal terms included; the
     /// drives' inertia is not), in N m.
-    #[cfg(any(test, feature = "internals"))]
     pub fn inverse_dynamics(&self, at: &Posture, qd: &J5, qdd: &J5, base: &BaseMotion) -> J5 {
         Self::inverse_dynamics_of(&self.bodies(at), at, qd, qdd, base)
     }
@@ -285,6 +321,24 @@ mod tests {
         assert!((full - bias - model.mass_matrix(&at) * qdd).norm() < 1e-12);
         let still = model.inverse_dynamics(&at, &J5::zeros(), &J5::zeros(), &base);
         assert!((still - model.gravity(&at)).norm() < 1e-12);
+    }
+
+    #[test]
+    fn joints_turn_about_their_axes() {
+        let model = ArmModel::youbot(0.219, 1.0);
+        let q = radians([10.0, -30.0, 100.0, 60.0, 30.0]);
+        let at = model.posture(&q);
+        let (mut turned, mut origin) = (Rotation3::identity(), Vector3::zeros());
+        for i in 0..JOINTS {
+            let axis = nalgebra::Unit::new_normalize(Vector3::from(JOINT_AXIS[i]));
+            assert_eq!(axis.norm_squared(), axis.amax(), "an axis of the frame");
+            origin += turned * Vector3::from(JOINT_ORIGIN[i]);
+            assert!((turned * axis.into_inner() - at.axes[i]).norm() < 1e-12);
+            turned *= Rotation3::from_axis_angle(&axis, q[i]);
+            assert!((turned.matrix() - at.rotations[i].matrix()).norm() < 1e-12);
+            assert!((origin - at.origins[i]).norm() < 1e-12);
+        }
+        assert!((origin + turned * Vector3::from(TOOL_OFFSET) - at.tool).norm() < 1e-12);
     }
 
     #[test]

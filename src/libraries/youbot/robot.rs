@@ -67,7 +67,7 @@ impl Robot {
         let law = self.dynamics.update(
             &self.body.arm.q,
             &self.body.arm.qd,
-            &self.tool.jacobian,
+            &self.tool.jacobian(),
             self.body.base.twist,
             Some(&coupled),
             CONTROL_PERIOD,

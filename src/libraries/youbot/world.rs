@@ -3,7 +3,7 @@
 use super::base::Twist2;
 use super::kinematics::Tool;
 use super::parameters::GRIPPER;
-use super::plant::{ArmPlant, BasePlant, base_rotation};
+use super::plant::{ArmPlant, BasePlant};
 use super::rigid_body::{ArmModel, J5, Posture};
 use nalgebra::Vector3;
 
@@ -195,7 +195,7 @@ impl RobotBody {
             let bar = self.surroundings.bar_force(&tool.position, &tool.velocity);
             self.contact.x += bar;
             self.on_bar -= bar / steps;
-            let force = base_rotation(self.base.pose).inverse() * (push + self.contact);
+            let force = tool.turn.inverse() * (push + self.contact);
             let motion = self.base.step(twist, step);
             // Shorted windings have no torque of the drives' to follow.
             let follows = if braked || self.torque_lag <= 0.0 { 1.0 } else { 1.0 - (-step / self.torque_lag).exp() };

@@ -4,7 +4,9 @@ mod bus;
 mod faults;
 mod operations;
 
-use super::samples::{DriverState, JointState, MotorStates, Odometry, PlantCommand, PlantState, Twist, stamp};
+use super::samples::{
+    DriverState, IdentifiedArm, JointState, MotorStates, Odometry, PlantCommand, PlantState, Twist, stamp,
+};
 use super::{aged, going_on};
 use crate::libraries::youbot::drives::{DriveHappening, DriveMode, DriveOutput, DriveParameters, Drives, Measured};
 use crate::libraries::youbot::motors::{Encoders, HeatChange, HeatLimit};
@@ -49,6 +51,7 @@ pub struct Driver {
     watched: In<bool>,
     jointstate: Out<JointState>,
     odometry: Out<Odometry>,
+    identified: Out<IdentifiedArm>,
     motor_states: Out<MotorStates>,
     driver_state: Out<DriverState>,
     control_mode: Out<u8>,
@@ -137,6 +140,9 @@ impl Component for Driver {
                 .input("watched"),
             jointstate: b.doc("What the joints measure.").output("jointstate"),
             odometry: b.doc("Where the base is.").output("odometry"),
+            identified: b
+                .doc("How the arm differs from its model, found while it unfolds or folds by itself; not written before, nor where it does not tell.")
+                .output("identified"),
             motor_states: b.doc("How the motors are.").output("motor_states"),
             driver_state: b.doc("How the field bus is.").output("driver_state"),
             control_mode: b.doc("What the drives do: 0, 1 or 6.").output("control_mode"),
@@ -321,6 +327,9 @@ impl Driver {
             let heat = AMBIENT + HEATING * current * current - self.motors.temp[i];
             self.motors.current[i] = current;
             self.motors.temp[i] += heat * cx.dt() / HEAT_TIME;
+        }
+        if let Some(arm) = d.identified() {
+            self.identified.write(arm.into());
         }
         self.motor_states.write(self.motors);
         self.driver_state.write(self.bus);

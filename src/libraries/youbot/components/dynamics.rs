@@ -1,8 +1,9 @@
 //! `youbot.Dynamics`: from the wanted force to torques and a motion of the base.
 
-use super::samples::{JointState, Odometry, Twist, seconds_since};
+use super::samples::{IdentifiedArm, JointState, Odometry, Twist, seconds_since};
 use super::{aged, going_on};
 use crate::libraries::youbot::dynamics::{Coupled, Dynamics, DynamicsParameters, Jacobian8};
+use crate::libraries::youbot::identification::ArmScales;
 use crate::libraries::youbot::link::PeerState;
 use crate::libraries::youbot::parameters::GRIPPER;
 use crate::libraries::youbot::rigid_body::{ArmModel, J5};
@@ -21,6 +22,7 @@ pub struct DynamicsComponent {
     jointstate: In<JointState>,
     jacobian: In<[f64; 24]>,
     odometry: In<Odometry>,
+    identified: In<IdentifiedArm>,
     effort: Out<J5>,
     base_twist: Out<Twist>,
     tau_sat: Out<u8>,
@@ -37,6 +39,8 @@ pub struct DynamicsComponent {
     soft_limit_k: Prop<f64>,
     tau_max: Prop<J5>,
     law: Dynamics,
+    /// As it was identified.
+    arm: ArmScales,
 }
 
 impl Component for DynamicsComponent {
@@ -48,14 +52,14 @@ impl Component for DynamicsComponent {
         )
         .start_after("youbot.Cart_Impedance")
         .on_configure(|c, _| {
-            c.law.model = ArmModel::youbot(c.payload.get(), 1.0);
+            c.law.believe(c.arm, c.payload.get());
             Ok(())
         })
         .on_start(|c, _| {
             c.law.reset();
             Ok(())
         });
-        b.doc("Torques that hold the arm at these angles.")
+        b.doc("Torques that hold the arm at these angles, as it was found.")
             .no_effect()
             .operation("compute_gravity", |c, _, (q,): (J5,)| {
                 OperationAnswer::Done(c.law.model.gravity(&c.law.model.posture(&q)))
@@ -74,6 +78,9 @@ impl Component for DynamicsComponent {
             jointstate: b.doc("What the joints measure.").required().input("jointstate"),
             jacobian: b.doc("As Arm_Kinematics gives it.").required().input("jacobian"),
             odometry: b.doc("How the base moves.").input("odometry"),
+            identified: b
+                .doc("How the arm differs from its model, as the driver has found it. Not connected, or nothing found: not at all.")
+                .input("identified"),
             effort: b.doc("Torques.").unit("N m").output("joint_effort_command"),
             base_twist: b.doc("Wanted motion of the base, in its frame.").output("base_twist"),
             tau_sat: b.doc("Bit i: joint i+1 is at its torque limit.").output("tau_sat"),
@@ -130,6 +137,7 @@ impl Component for DynamicsComponent {
                 .property("soft_limit_k", p.soft_limit_k),
             tau_max: b.doc("Largest torques asked for.").unit("N m").range(0.0..=20.0).property("tau_max", p.tau_max),
             law: Dynamics::new(ArmModel::youbot(GRIPPER.mass, 1.0)),
+            arm: ArmScales::default(),
         }
     }
 
@@ -148,6 +156,11 @@ impl Component for DynamicsComponent {
             posture: self.law.parameters.posture,
             tau_max: self.tau_max.get(),
         };
+        let arm = self.identified.get().map(ArmScales::from).unwrap_or_default();
+        if arm != self.arm {
+            self.arm = arm;
+            self.law.believe(arm, self.payload.get());
+        }
         let jacobian = aged(&mut self.jacobian, cx).filter(|(_, age)| *age <= STALE);
         let fresh = |age: f64| age <= STALE && jacobian.is_some();
         let force = aged(&mut self.f_des, cx).filter(|(_, age)| fresh(*age));

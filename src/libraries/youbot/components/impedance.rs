@@ -2,7 +2,7 @@
 
 use super::going_on;
 use super::samples::{ExtRef, ToolPose, ToolTwist, stamp};
-use crate::libraries::youbot::impedance::{CouplingLaw, Impedance, ImpedanceParameters, Reference};
+use crate::libraries::youbot::impedance::{CouplingLaw, DELAY_DAMPING, Impedance, ImpedanceParameters, Reference};
 use crate::model::Tunable;
 use crate::runtime::{Builder, Component, Context, Failure, In, OperationAnswer, Out, Prop};
 use nalgebra::Vector3;
@@ -19,11 +19,13 @@ pub struct CartImpedance {
     ref_age: Out<f64>,
     active: Out<bool>,
     engaged: Out<f64>,
+    damping: Out<f64>,
     energy_sent: Out<f64>,
     law: Prop<String>,
     stiffness: Prop<f64>,
     damping_rel: Prop<f64>,
     damping_abs: Prop<f64>,
+    delay_damping: Prop<f64>,
     f_max: Prop<f64>,
     f_rate: Prop<f64>,
     ref_max_age: Prop<f64>,
@@ -89,6 +91,7 @@ impl Component for CartImpedance {
             ref_age: b.doc("Age of the reference; not written before the first one.").unit("s").output("ref_age"),
             active: b.doc("Whether the force is to be put out: ext_ref_mode.").output("active"),
             engaged: b.doc("How much of the coupling is in force: from 0, let go of, to 1.").output("engaged"),
+            damping: b.doc("Damper on the own velocity as it is now.").unit("N s/m").output("damping"),
             energy_sent: b
                 .doc("Energy given to the other robot's coupling so far, for Link_Tx (law `tank`).")
                 .unit("J")
@@ -107,10 +110,17 @@ impl Component for CartImpedance {
                 .range(0.0..=200.0)
                 .property("damping_rel", p.damping_rel),
             damping_abs: b
-                .doc("Damper on the own velocity; at least 1.2 times stiffness times delay.")
+                .doc("Damper on the own velocity, at least.")
                 .unit("N s/m")
                 .range(0.0..=200.0)
                 .property("damping_abs", p.damping_abs),
+            delay_damping: b
+                .doc(
+                    "Where the reference is late, that damper is this times stiffness times its mean age over 0.2 s, if that is more: from \
+                     1.2 on the coupling stays stable. 0: never. Law `tank` does without.",
+                )
+                .range(0.0..=5.0)
+                .property("delay_damping", DELAY_DAMPING),
             f_max: b.doc("Largest force.").unit("N").range(0.0..=30.0).property("f_max", p.f_max),
             f_rate: b.doc("Fastest change of it.").unit("N/s").range(0.1..=1000.0).property("f_rate", p.f_rate),
             ref_max_age: b
@@ -136,6 +146,7 @@ impl Component for CartImpedance {
             stiffness: self.stiffness.get(),
             damping_rel: self.damping_rel.get(),
             damping_abs: self.damping_abs.get(),
+            delay_damping: self.delay_damping.get(),
             f_max: self.f_max.get(),
             f_rate: self.f_rate.get(),
             ref_max_age: self.ref_max_age.get(),
@@ -152,6 +163,7 @@ impl Component for CartImpedance {
         let out = self.coupling.update(&pose.p.into(), &twist.v.into(), reference.as_ref(), coupled, going_on(cx));
         self.f_des.write(out.force);
         self.engaged.write(out.engaged);
+        self.damping.write(self.coupling.damping());
         self.energy_sent.write(self.coupling.energy_sent());
         if let Some(reference) = reference {
             self.f_raw_norm.write(out.raw_norm);

@@ -60,11 +60,11 @@ impl Component for ArmKinematics {
         let Some(joints) = self.jointstate.get() else { return };
         let (pose, twist) = self.odometry.get().unwrap_or_default().split();
         let tool = Tool::of(&self.model, &J5::from(joints.pos), &J5::from(joints.vel), pose, twist);
-        self.tool_pose.write(ToolPose { p: tool.position.into(), q: tool.orientation.coords.into() });
+        self.tool_pose.write(ToolPose { p: tool.position.into(), q: tool.orientation().coords.into() });
         self.tool_twist.write(ToolTwist { v: tool.velocity.into(), w: tool.rotation_rate.into() });
         let mut flat = [0.0; 24];
-        flat.copy_from_slice(tool.jacobian.as_slice());
+        flat.copy_from_slice(tool.jacobian().as_slice());
         self.jacobian.write(flat);
-        self.manipulability.write(tool.manipulability);
+        self.manipulability.write(tool.manipulability());
     }
 }

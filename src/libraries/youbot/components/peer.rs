@@ -3,8 +3,7 @@
 use super::net::{NetworkProperties, seen_by};
 use super::samples::{ToolPose, stamp};
 use crate::libraries::youbot::hand::{Hand, HandScript};
-use crate::libraries::youbot::impedance::CouplingLaw;
-use crate::libraries::youbot::impedance::Reference;
+use crate::libraries::youbot::impedance::{CouplingLaw, DELAY_DAMPING, Reference};
 use crate::libraries::youbot::link::{LinkReceiver, Packet};
 use crate::libraries::youbot::network::{Network, Quality};
 use crate::libraries::youbot::rigid_body::{J5, radians};
@@ -177,6 +176,7 @@ impl Component for Peer {
         p.stiffness = self.stiffness.get();
         p.damping_rel = self.damping_rel.get();
         p.damping_abs = self.damping_abs.get();
+        p.delay_damping = DELAY_DAMPING;
         w.robot.dynamics.parameters.force_gain = self.force_gain.get();
         while let Some(packet) = self.rx.take() {
             w.to_peer.send(now, packet);
@@ -208,7 +208,7 @@ impl Component for Peer {
         while let Some(packet) = w.from_peer.receive(now) {
             self.tx.write(seen_by(packet, ahead));
         }
-        self.tool_pose.write(ToolPose { p: tool.position.into(), q: tool.orientation.coords.into() });
+        self.tool_pose.write(ToolPose { p: tool.position.into(), q: tool.orientation().coords.into() });
     }
 }
 

@@ -1,6 +1,7 @@
 //! What travels through the ports.
 
 use crate::libraries::youbot::base::{Pose2, Twist2};
+use crate::libraries::youbot::identification::ArmScales;
 use crate::libraries::youbot::rigid_body::J5;
 use crate::time::Time;
 
@@ -70,6 +71,15 @@ crate::runtime::record! {
         pub stamp: i64,
     }
 
+    /// How the arm differs from its model, as a motion has told.
+    #[derive(Copy)]
+    pub struct IdentifiedArm {
+        /// Its links' masses, as multiples of the model's.
+        pub mass_scale: f64,
+        /// Its joints' friction, the same.
+        pub friction_scale: f64,
+    }
+
     /// How the motors are.
     #[derive(Copy, Default)]
     pub struct MotorStates {
@@ -123,6 +133,18 @@ crate::runtime::record! {
         pub coupled: bool,
         /// Energy its coupling has given to this one's so far, J.
         pub energy: f64,
+    }
+}
+
+impl From<ArmScales> for IdentifiedArm {
+    fn from(arm: ArmScales) -> Self {
+        Self { mass_scale: arm.mass, friction_scale: arm.friction }
+    }
+}
+
+impl From<IdentifiedArm> for ArmScales {
+    fn from(arm: IdentifiedArm) -> Self {
+        Self { mass: arm.mass_scale, friction: arm.friction_scale }
     }
 }
 

@@ -123,7 +123,7 @@ impl WorldRobot {
     fn publish(&mut self, stamp: i64) {
         let (arm, base, tool) = (&self.body.arm, &self.body.base, self.body.tool());
         self.state.write(PlantState::new(arm.q, arm.qd, base.pose, base.twist, stamp));
-        self.tool_pose.write(ToolPose { p: tool.position.into(), q: tool.orientation.coords.into() });
+        self.tool_pose.write(ToolPose { p: tool.position.into(), q: tool.orientation().coords.into() });
         self.tool_twist.write(ToolTwist { v: tool.velocity.into(), w: tool.rotation_rate.into() });
         self.contact.write(self.body.contact);
         self.torque.write(*self.body.given());

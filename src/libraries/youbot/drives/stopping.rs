@@ -1,7 +1,7 @@
 //! How an arm comes to rest that is to be held: along a ramp, without driving on into what it meets.
 
 use super::{Drives, JOINTS, SPEED_GAIN};
-use crate::libraries::youbot::base::Pose2;
+use crate::libraries::youbot::base::{Pose2, Twist2};
 use crate::libraries::youbot::handover::{QUICK_STOP, slowed};
 use crate::libraries::youbot::kinematics::Tool;
 use crate::libraries::youbot::parameters::SPEED_LIMIT;
@@ -53,7 +53,10 @@ impl Rolling {
     /// None: the base stands.
     fn of(drives: &Drives) -> Option<Self> {
         let (now, base) = (&drives.measured, drives.measured.base);
-        let jacobian = Tool::of(&drives.model, &now.q, &now.qd, Pose2::default(), base).jacobian;
+        if base == Twist2::default() {
+            return None;
+        }
+        let jacobian = Tool::of(&drives.model, &now.q, &now.qd, Pose2::default(), base).jacobian();
         let rolls = jacobian.fixed_columns::<3>(0) * Vector3::new(base.vx, base.vy, base.wz);
         let arm = jacobian.fixed_columns::<JOINTS>(3).into_owned();
         (rolls.norm() >= STANDS).then_some(Self { arm, rolls })

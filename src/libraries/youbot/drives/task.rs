@@ -1,6 +1,6 @@
 //! What the drives are at by themselves: a motion from one pose to another, or looking for the stops.
 
-use super::{DriveHappening, DriveMode, Drives, JOINTS, RANGE_LOWER_DEG, RANGE_UPPER_DEG};
+use super::{DriveHappening, DriveMode, Drives, JOINTS, Measured, RANGE_LOWER_DEG, RANGE_UPPER_DEG};
 use crate::libraries::youbot::rigid_body::J5;
 
 /// Peak joint speed of folding and unfolding, in rad/s; of joint 4 a ninth more.
@@ -50,9 +50,9 @@ impl Motion {
         Self { from, to, duration: takes((to - from).amax()).max(0.2), folds }
     }
 
-    /// Where it should be so many seconds after it set out, and how fast.
-    fn at(&self, elapsed: f64) -> (J5, J5) {
-        let (mut at, mut speed) = (self.to, J5::zeros());
+    /// Where it should be so many seconds after it set out, how fast, and how much faster (rad/s²).
+    fn at(&self, elapsed: f64) -> (J5, J5, J5) {
+        let (mut at, mut speed, mut faster) = (self.to, J5::zeros(), J5::zeros());
         for i in 0..JOINTS {
             let way = self.to[i] - self.from[i];
             let (first, last) = PARTS[i];
@@ -63,8 +63,9 @@ impl Motion {
             let s = ((elapsed - begins) / time).clamp(0.0, 1.0);
             at[i] = self.from[i] + way * s * s * s * (10.0 - 15.0 * s + 6.0 * s * s);
             speed[i] = way * 30.0 * s * s * (1.0 - 2.0 * s + s * s) / time;
+            faster[i] = way * 60.0 * s * (1.0 - 3.0 * s + 2.0 * s * s) / (time * time);
         }
-        (at, speed)
+        (at, speed, faster)
     }
 }
 
@@ -142,14 +143,19 @@ impl Drives {
                 return;
             }
             self.handover.begin();
+            self.identification.begin();
             let motion = Motion::new(self.measured.q, to, folds);
             self.task = DriveTask::Moving { motion, elapsed: 0.0, behind: 0.0, pressed: 0.0, fails };
         }
         match &mut self.task {
+            // What is held matters where a position is.
+            DriveTask::Idle if self.mode != DriveMode::Positioning => {}
             DriveTask::Idle | DriveTask::SettingOut { .. } => self.come_to_rest(dt),
             DriveTask::Moving { motion, elapsed, behind, pressed, fails } => {
+                let Measured { q, qd, .. } = &self.measured;
+                self.identification.take(*elapsed, q, qd, &motion.at(*elapsed).2, &self.torque);
                 *elapsed += dt;
-                (self.target, self.target_speed) = motion.at(*elapsed);
+                (self.target, self.target_speed, _) = motion.at(*elapsed);
                 let (motion, over, fails) = (*motion, *elapsed - motion.duration, *fails);
                 *behind = if (self.target - self.measured.q).amax() > BLOCKED_ERROR { *behind + dt } else { 0.0 };
                 *pressed = if self.presses { *pressed + dt } else { 0.0 };
@@ -157,6 +163,7 @@ impl Drives {
                 // The motion has ended when the arm is there, not when it should be.
                 if over >= 0.0 && (self.measured.q - motion.to).amax() < ARRIVAL_ERROR {
                     self.task = DriveTask::Idle;
+                    self.identified = self.identification.found().or(self.identified);
                     report(if fails { DriveHappening::MotionFailed } else { DriveHappening::Arrived });
                 } else if blocked && fails {
                     self.hold();

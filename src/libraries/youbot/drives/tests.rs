@@ -1,5 +1,6 @@
 //! What the drives do, without a component around them.
 
+use super::super::motors::Encoders;
 use super::super::world::RobotBody;
 use super::*;
 use nalgebra::Vector3;
@@ -363,4 +364,65 @@ fn up() -> Driving {
     drives.unfold().unwrap();
     run(&mut drives, 6.0);
     drives
+}
+
+/// Unfolds an arm as it may be, with a `push` on the tool meanwhile; what was found of it.
+fn unfolded(mass: f64, friction: f64, push: Vector3<f64>) -> Option<ArmScales> {
+    let mut drives = Driving::new([0.0, -60.0, 140.0, -98.0, 0.0], mass);
+    (drives.body.arm.friction_scale, drives.body.torque_lag) = (friction, 0.002);
+    drives.calibrate().unwrap();
+    run(&mut drives, 3.0);
+    assert_eq!(drives.identified(), None, "calibrating tells nothing");
+    drives.unfold().unwrap();
+    let mut encoders = Encoders::default();
+    for _ in 0..6000 {
+        let (q, qd) = encoders.read(&drives.body.arm.q, 0.001);
+        let measured = Measured { q, qd, base: Twist2::default() };
+        let driven = drives.drives.update(measured, None, None, 0.001, &mut |_| {});
+        drives.body.advance(&driven.torque, driven.twist, &push, driven.braked, 0.001);
+    }
+    drives.identified()
+}
+
+#[test]
+fn unfolding_tells_what_the_arm_weighs_and_how_it_rubs() {
+    for mass in [0.9, 1.0, 1.1] {
+        for friction in [0.7, 1.0, 1.3] {
+            let found = unfolded(mass, friction, Vector3::zeros()).expect("it tells");
+            assert!((found.mass - mass).abs() < 0.005, "{mass} {friction}: {found:?}");
+            assert!((found.friction - friction).abs() < 0.01, "{mass} {friction}: {found:?}");
+        }
+    }
+}
+
+#[test]
+fn an_arm_that_somebody_moves_meanwhile_tells_nothing() {
+    let ways = [Vector3::x(), -Vector3::x(), Vector3::y(), Vector3::z(), -Vector3::z()];
+    for push in ways.iter().flat_map(|way| [1.0, 2.0, 4.0, 8.0].map(|newtons| way * newtons)) {
+        let found = unfolded(1.0, 1.0, push);
+        // Across the plane in which the joints turn it is the others that hold it.
+        let across = push.y != 0.0;
+        let harmless = |arm: ArmScales| (arm.mass - 1.0).abs() < 0.005 && (arm.friction - 1.0).abs() < 0.01;
+        assert!(if across { found.is_some_and(harmless) } else { found.is_none() }, "{push:?}: {found:?}");
+    }
+}
+
+/// Something soft in the way of an unfolding tool, which the motion gets past.
+#[test]
+fn an_arm_that_brushes_past_something_soft_is_not_taken_for_another_one() {
+    for (table, wall) in [(0.32, 100.0), (0.34, 100.0), (0.36, 100.0), (-100.0, 0.36), (-100.0, 0.34), (-100.0, 0.32)] {
+        let mut drives = parked();
+        drives.calibrate().unwrap();
+        run(&mut drives, 3.0);
+        (drives.body.surroundings.table, drives.body.surroundings.wall) = (table, wall);
+        (drives.body.surroundings.stiffness, drives.body.surroundings.damping) = (60.0, 5.0);
+        drives.unfold().unwrap();
+        let mut pressed: f64 = 0.0;
+        for _ in 0..6000 {
+            drives.update(None, None, &Vector3::zeros(), 0.001, &mut |_| {});
+            pressed = pressed.max(drives.body.contact.norm());
+        }
+        assert!(pressed > 1.0 && !drives.busy(), "{table} {wall}: {pressed} N");
+        assert_eq!(drives.identified(), None, "{table} {wall}");
+    }
 }
