@@ -88,7 +88,7 @@ pub const FADE: f64 = 0.1;
 pub const ENGAGE: f64 = 0.3;
 /// Damping on the own velocity per stiffness and delay (youbot.md §3.2): 1 is what the delay takes, the rest is for what varies.
 pub const DELAY_DAMPING: f64 = 1.2;
-/// The delay is taken as the mean age of the reference over about so long, in s.
+/// What the delay asks for is taken on the average over about so long, in s.
 const DELAY_TIME: f64 = 0.2;
 
 /// The law with its memory.
@@ -99,8 +99,8 @@ pub struct Impedance {
     ramp: Vector3<f64>,
     trust: f64,
     share: f64,
-    /// How old the reference is on the average, in s.
-    delay: f64,
+    /// Stiffness times age of the reference, on the average, in N s/m: a change of either is not felt as a step.
+    delayed: f64,
     tank: Tank,
 }
 
@@ -137,7 +137,7 @@ impl Impedance {
         let fresh = reference.is_some_and(|r| r.age <= p.ref_max_age);
         // What is older is not believed, and pulls at nothing.
         let age = reference.map_or(0.0, |r| r.age.clamp(0.0, p.ref_max_age));
-        self.delay += (age - self.delay) * dt / (DELAY_TIME + dt);
+        self.delayed += (p.stiffness * age - self.delayed) * dt / (DELAY_TIME + dt);
         self.trust = (self.trust + if fresh { dt / FADE } else { -dt / FADE }).clamp(0.0, 1.0);
         self.share = (self.share + if coupled { dt / ENGAGE } else { -dt / FADE }).clamp(0.0, 1.0);
         if self.share == 0.0 {
@@ -163,7 +163,7 @@ impl Impedance {
     pub fn damping(&self) -> f64 {
         let p = &self.parameters;
         match p.law {
-            CouplingLaw::Position => p.damping_abs.max(p.delay_damping * p.stiffness * self.delay),
+            CouplingLaw::Position => p.damping_abs.max(p.delay_damping * self.delayed),
             CouplingLaw::Tank => p.damping_abs,
         }
     }
@@ -178,7 +178,7 @@ impl Impedance {
         self.ramp = Vector3::zeros();
         self.trust = 0.0;
         self.share = 0.0;
-        self.delay = 0.0;
+        self.delayed = 0.0;
         self.tank = Tank::default();
     }
 }
@@ -246,6 +246,8 @@ mod tests {
             assert!((law.damping() - last).abs() < 0.1, "{} {last}", law.damping());
             (last, force) = (law.damping(), out.force);
             let least = DELAY_DAMPING * 150.0 * 0.05;
+            // The same law, a little less stiff for a moment.
+            law.parameters.stiffness = if (2300..2310).contains(&tick) { 120.0 } else { 150.0 };
             match tick {
                 0..1000 | 3800..5000 => assert_eq!(last, 5.0, "{tick} ms"),
                 2200..3000 => assert!(last >= least && last < 1.1 * least, "{tick} ms: {last}"),
