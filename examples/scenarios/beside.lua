@@ -7,6 +7,7 @@
 
 local real, times = param("real", false), param("times", 100)
 deploy("../../deployments/youbot_coupling.yaml")
+
 -- Asks the robots in turn, each for another profile every time; median and worst.
 local function tuned(name, robots)
   local took = {}

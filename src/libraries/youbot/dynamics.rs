@@ -310,6 +310,19 @@ mod tests {
     }
 
     #[test]
+    fn what_an_arm_carries_is_not_scaled_with_it() {
+        let mut law = Dynamics::new(ArmModel::youbot(0.219, 1.0));
+        let q = radians([0.0, -30.0, 100.0, 60.0, 0.0]);
+        let mut gravity = |mass: f64, payload: f64| {
+            law.believe(ArmScales { mass, friction: 1.0 }, payload);
+            law.model.gravity(&law.model.posture(&q))
+        };
+        let (alone, loaded) = (gravity(1.0, 0.0), gravity(1.0, 0.5));
+        assert!((loaded - alone).norm() > 0.5);
+        assert!((gravity(1.1, 0.5) - (alone * 1.1 + (loaded - alone))).norm() < 1e-12);
+    }
+
+    #[test]
     fn the_base_sets_out_gently_for_a_tool_that_is_off_its_place() {
         let model = ArmModel::youbot(0.219, 1.0);
         let mut law = Dynamics::new(model.clone());
