@@ -249,6 +249,9 @@ pub const LUA_STRING: usize = 1024 * 1024;
 /// Events and answers remembered for those who wait for one: a wait begins before what it waits for is asked, so only what
 /// happens between two looks of the waiter must fit.
 pub const HEARD: usize = 1024;
+
+/// Events that components have raised and that are still to be written down: whoever raises one more writes them down itself.
+pub const UNWRITTEN: usize = 256;
 /// Operation calls in the inverse of squashed frames. Calls do not cancel like writes do, so they would pile up; with more
 /// than this the oldest frames become a floor instead.
 pub const SQUASHED_CALLS: usize = 256;

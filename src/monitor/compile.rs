@@ -1,8 +1,8 @@
 //! From a condition as written to a program.
 
-use super::bank::{MonitorInput, state_value};
 use super::nodes::{Number, Rate, TruthNode};
 use super::program::CompiledCondition;
+use super::sample::{MonitorInput, state_value};
 use super::window::{SinceWindow, Window};
 use crate::limits::MONITOR_PIECES;
 use crate::model::monitor::{Comparison, Condition, ConditionKind, Interval, MonitoredSignal, SignalKind};

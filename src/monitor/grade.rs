@@ -31,6 +31,11 @@ impl Grade {
         Self { robustness: -self.robustness, holds: !self.holds }
     }
 
+    /// Whether it is the same to the bit.
+    pub fn is_same(self, other: Self) -> bool {
+        self.robustness.to_bits() == other.robustness.to_bits() && self.holds == other.holds
+    }
+
     /// Whether `self` is less than `other`.
     pub fn less(self, other: Self) -> bool {
         self.robustness < other.robustness || (self.robustness == other.robustness && !self.holds && other.holds)

@@ -11,7 +11,7 @@
 //! **Cost.** An operator over time keeps, of the pieces in its window, those that may still become its extreme: each piece
 //! enters once and leaves once, so a sample costs the same whatever the length of the window.
 //!
-//! * [`Bank`]: all monitors of a deployment. * `program`: one condition, compiled. * `window`: `once` and `since`.
+//! * [`Bank`]: all monitors of a deployment. * `watched`: one of them. * `program`: its condition, compiled. * `window`: `once` and `since`.
 //! * `pieces`: sliding extremes. * `grade`: truth and robustness, together.
 //! * [`table`]: recorded samples as text. [`replay`]: monitors over them.
 
@@ -23,8 +23,11 @@ mod pieces;
 mod program;
 pub mod replay;
 mod ring;
+mod sample;
 pub mod table;
+mod watched;
 mod window;
 
-pub use bank::{Bank, InputSample, MonitorInput, Troubles, state_value};
+pub use bank::{Bank, Troubles};
 pub use grade::Grade;
+pub use sample::{InputSample, MonitorInput, state_value};

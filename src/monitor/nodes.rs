@@ -1,10 +1,21 @@
 //! The parts of a compiled condition.
 
-use super::bank::InputSample;
 use super::grade::Grade;
 use super::ring::{RingBuffer, grain};
+use super::sample::InputSample;
 use super::window::{SinceWindow, Window};
 use crate::model::monitor::Comparison;
+
+/// What a part is made of, each by its place.
+#[derive(Debug, Default)]
+pub struct MadeOf {
+    /// Inputs.
+    pub inputs: Vec<usize>,
+    /// Numbers before it.
+    pub numbers: Vec<usize>,
+    /// Truths before it.
+    pub truths: Vec<usize>,
+}
 
 /// A number, from samples and from numbers before it in the list.
 #[derive(Debug, Clone, PartialEq)]
@@ -224,6 +235,22 @@ impl TruthNode {
         }
     }
 
+    /// What it is made of.
+    pub fn made_of(&self) -> MadeOf {
+        match self {
+            Self::Compare { left, right, .. } => MadeOf { numbers: vec![*left, *right], ..MadeOf::default() },
+            Self::Age { slot, .. } | Self::IsTrue(slot) | Self::Is(slot, _) => {
+                MadeOf { inputs: vec![*slot], ..MadeOf::default() }
+            }
+            Self::All(list) | Self::Any(list) => MadeOf { truths: list.to_vec(), ..MadeOf::default() },
+            Self::Not(i) | Self::Rise(i, _) | Self::Fall(i, _) | Self::Once(i, _) | Self::Historically(i, _) => {
+                MadeOf { truths: vec![*i], ..MadeOf::default() }
+            }
+            Self::Since(hold, from, _) => MadeOf { truths: vec![*hold, *from], ..MadeOf::default() },
+            Self::Lived(..) => MadeOf::default(),
+        }
+    }
+
     /// Whether it may ever change though nothing it is made of does.
     pub fn is_timed(&self) -> bool {
         match self {
@@ -286,6 +313,19 @@ impl TruthNode {
 }
 
 impl Number {
+    /// What it is made of.
+    pub fn made_of(&self) -> MadeOf {
+        match self {
+            Self::Input(slot) | Self::Rate(slot, _) => MadeOf { inputs: vec![*slot], ..MadeOf::default() },
+            Self::Constant(_) => MadeOf::default(),
+            Self::Norm(list) | Self::Min(list) | Self::Max(list) => {
+                MadeOf { numbers: list.to_vec(), ..MadeOf::default() }
+            }
+            Self::Difference(a, b) => MadeOf { numbers: vec![*a, *b], ..MadeOf::default() },
+            Self::Abs(i) => MadeOf { numbers: vec![*i], ..MadeOf::default() },
+        }
+    }
+
     /// As [`TruthNode::is_timed`].
     pub fn is_timed(&self) -> bool {
         matches!(self, Self::Rate(..))

@@ -1,6 +1,7 @@
 //! Monitors over recorded samples.
 
-use super::bank::{Bank, InputSample, MonitorInput, Troubles};
+use super::bank::{Bank, Troubles};
+use super::sample::{InputSample, MonitorInput};
 use super::table::{Columns, TableProblem};
 use crate::limits::SAMPLES_WAKES;
 use crate::model::{EventName, Monitor};

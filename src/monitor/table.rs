@@ -2,7 +2,7 @@
 //!
 //! Line by line, so that a recording may be as long as it likes. What is wrong comes with its column in the line.
 
-use super::bank::state_value;
+use super::sample::state_value;
 use crate::model::codes::{SAMPLES_BACKWARDS, SAMPLES_BAD_NUMBER, SAMPLES_BAD_TIME, SAMPLES_COLUMNS, SAMPLES_EMPTY};
 use crate::model::{Code, RunState};
 use crate::time::Time;

@@ -39,6 +39,20 @@ struct Counters {
     duration_max: AtomicU64,
 }
 
+/// Adds to a counter that the activity alone counts: whoever reads it meanwhile has it before or after, and an exchange, which would cost
+/// more than what is counted, is not needed.
+fn count(counter: &AtomicU64, more: u64) {
+    counter.store(counter.load(Ordering::Relaxed) + more, Ordering::Relaxed);
+}
+
+/// The same of what is noted last, and of the largest of them.
+fn note(last: &AtomicU64, largest: &AtomicU64, value: u64) {
+    last.store(value, Ordering::Relaxed);
+    if value > largest.load(Ordering::Relaxed) {
+        largest.store(value, Ordering::Relaxed);
+    }
+}
+
 /// What is done with a component that was put in quarantine and has come back.
 pub(crate) type LateCall = Box<dyn Fn(&Arc<Cell>) + Send + Sync>;
 
@@ -167,7 +181,10 @@ impl ActivityThread {
 
     /// Serves what is asked; while nothing runs, or when it is to end, answers what to wait for.
     fn attend(&self, rounds: &mut Rounds) -> Option<TaskWait> {
-        self.parked.store(false, Ordering::SeqCst);
+        // Nobody else marks it.
+        if self.parked.load(Ordering::Relaxed) {
+            self.parked.store(false, Ordering::SeqCst);
+        }
         if self.ended.load(Ordering::SeqCst) {
             return Some(TaskWait::End);
         }
@@ -217,11 +234,10 @@ impl ActivityThread {
             if late >= period {
                 // An operation took long, or the thread came late: what is past is missed but for the newest, so that no two rounds come at once.
                 let missed = (now.0 - release.0) / step;
-                self.counters.overruns.fetch_add(missed, Ordering::Relaxed);
+                count(&self.counters.overruns, missed);
                 release = Time(release.0.saturating_add(missed.saturating_mul(step)));
             }
-            self.counters.latency_last.store(nanos(late), Ordering::Relaxed);
-            self.counters.latency_max.fetch_max(nanos(late), Ordering::Relaxed);
+            note(&self.counters.latency_last, &self.counters.latency_max, nanos(late));
             self.round(now, &mut rounds.schedule, |cell| {
                 if let Some(inside) = CellGuard::running(cell) {
                     self.update(cell, inside, now, release, period.as_secs_f64());
@@ -232,7 +248,7 @@ impl ActivityThread {
             if now > rounds.release {
                 // The releases that are past are missed; the phase is kept.
                 let missed = (now.0 - rounds.release.0).div_ceil(step);
-                self.counters.overruns.fetch_add(missed, Ordering::Relaxed);
+                count(&self.counters.overruns, missed);
                 rounds.release = Time(rounds.release.0.saturating_add(missed.saturating_mul(step)));
             }
         }
@@ -268,7 +284,7 @@ impl ActivityThread {
             if rounds.restless >= limits::EVENT_ROUNDS {
                 // A loop of components that wake each other would hold simulated time still and a CPU busy for ever.
                 rounds.restless = 0;
-                self.counters.overruns.fetch_add(1, Ordering::Relaxed);
+                count(&self.counters.overruns, 1);
                 return TaskWait::Pause(self.clock.now() + limits::EVENT_PAUSE);
             }
             rounds.restless += 1;
@@ -283,9 +299,8 @@ impl ActivityThread {
         }
         self.busy_since.store(Time::NEVER.0, Ordering::Release);
         let took = nanos(self.clock.now().since(now));
-        self.counters.cycles.fetch_add(1, Ordering::Relaxed);
-        self.counters.duration_last.store(took, Ordering::Relaxed);
-        self.counters.duration_max.fetch_max(took, Ordering::Relaxed);
+        count(&self.counters.cycles, 1);
+        note(&self.counters.duration_last, &self.counters.duration_max, took);
     }
 
     #[inline]

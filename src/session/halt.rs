@@ -80,7 +80,7 @@ struct HaltState {
     /// When one acted by itself last, and the requests that it made.
     acted: Option<(Time, Vec<RequestId>)>,
     /// What components reported since it began, each event once.
-    reported: Vec<String>,
+    reported: Vec<EventName>,
 }
 
 impl StoppingState {
@@ -152,17 +152,14 @@ impl StoppingState {
     /// A component raised an event.
     pub fn report(&self, event: EventName) {
         let mut state = lock(&self.state);
-        if state.began
-            && state.reported.len() < limits::REPORTED
-            && !state.reported.iter().any(|known| known == event.as_str())
-        {
-            state.reported.push(event.to_string());
+        if state.began && state.reported.len() < limits::REPORTED && !state.reported.contains(&event) {
+            state.reported.push(event);
         }
     }
 
     /// What components reported since stopping began.
     pub fn reported(&self) -> Vec<String> {
-        lock(&self.state).reported.clone()
+        lock(&self.state).reported.iter().map(ToString::to_string).collect()
     }
 
     pub fn view(&self, waits_for: Vec<String>) -> Option<StoppingView> {

@@ -8,6 +8,7 @@ use super::lanes::Lanes;
 use super::log::{ComponentFault, Happening, Log, LogEntry, LoggedAnswer, Phase};
 use super::names::Unlisted;
 use super::tap::LogSink;
+use super::writing::UnwrittenEvent;
 use crate::coordinator::{NotAccepted, Put};
 use crate::limits;
 use crate::model::{Ask, ConfigId, EventName, Raise, RequestId};
@@ -18,13 +19,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-/// Called with everything that happens, in the thread that acts: for tests and measurements, which keep no one waiting. What
-/// shows or passes on what happens hangs on a [tap](super::tap).
+/// Called with everything that happens, in the thread that writes it down: for tests and measurements, which keep no one waiting. On
+/// the real clock two that happen at once may come in another order than they are written in. What shows or passes on what happens hangs
+/// on a [tap](super::tap).
 pub type Observer = Arc<dyn Fn(Time, &Happening) + Send + Sync>;
 
 /// The common memory of one session.
 pub struct Hub {
-    clock: Clock,
+    pub(super) clock: Clock,
     /// For those who wait outside.
     real: Clock,
     state: Mutex<HubState>,
@@ -32,6 +34,10 @@ pub struct Hub {
     untold: AtomicBool,
     /// Wakes whoever drives the session.
     pub changed: Signal,
+    /// Wakes the thread that writes down what components raise.
+    pub(super) unwritten: Signal,
+    /// There is such a thread.
+    pub(super) is_written: AtomicBool,
     /// Wakes threads outside the clock (those of the control socket).
     outside: Condvar,
     configurations: FxHashSet<ConfigId>,
@@ -41,16 +47,18 @@ pub struct Hub {
     halt: StoppingState,
 }
 
-struct HubState {
+pub(super) struct HubState {
     phase: Phase,
     next: u64,
     outstanding: FxHashMap<RequestId, Outstanding>,
     faults: Vec<ComponentFault>,
-    log: Log,
-    observers: Vec<Observer>,
-    taps: Vec<Arc<dyn LogSink>>,
+    pub(super) log: Log,
+    /// What components have raised, oldest first, and nobody has written down yet.
+    pub(super) unwritten: VecDeque<UnwrittenEvent>,
+    pub(super) observers: Vec<Observer>,
+    pub(super) taps: Vec<Arc<dyn LogSink>>,
     /// The newest answers and events, for those who wait for one.
-    heard: Lanes<String>,
+    pub(super) heard: Lanes<String>,
     /// Events that found an inbox full since that was last told, and when it was.
     dropped: u64,
     dropped_told: Option<Time>,
@@ -60,8 +68,8 @@ struct HubState {
     /// The newest answers.
     answers: VecDeque<LoggedAnswer>,
     /// By coordinator: what its states are written with (`arm:`, or nothing), and its active ones.
-    active: BTreeMap<String, Vec<String>>,
-    epoch: u64,
+    pub(super) active: BTreeMap<String, Vec<String>>,
+    pub(super) epoch: u64,
 }
 
 /// A request that is not answered yet.
@@ -102,6 +110,7 @@ impl Hub {
                 outstanding: FxHashMap::default(),
                 faults: Vec::new(),
                 log: Log::default(),
+                unwritten: VecDeque::with_capacity(limits::UNWRITTEN),
                 observers: Vec::new(),
                 taps: Vec::new(),
                 heard: Lanes::new(limits::HEARD, limits::HEARD),
@@ -114,6 +123,8 @@ impl Hub {
             }),
             untold: AtomicBool::new(false),
             changed: clock.signal(),
+            unwritten: clock.signal(),
+            is_written: AtomicBool::new(false),
             outside: Condvar::new(),
             configurations: configurations.into_iter().collect(),
             emits: emits.into_iter().collect(),
@@ -143,7 +154,19 @@ impl Hub {
         self.halt.has_begun()
     }
 
+    /// With all written down that there is: whoever looks sees what happened before. It may be an observer that looks, so none is
+    /// waited for.
     fn lock(&self) -> MutexGuard<'_, HubState> {
+        let state = self.state();
+        if state.unwritten.is_empty() {
+            return state;
+        }
+        drop(state);
+        self.catch_up(None);
+        self.state()
+    }
+
+    pub(super) fn state(&self) -> MutexGuard<'_, HubState> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -158,16 +181,6 @@ impl Hub {
         }
     }
 
-    /// Writes down that something happened, and tells the observers.
-    pub fn note(&self, what: Happening) {
-        self.record(what, false);
-    }
-
-    /// The same, of an event that a component raised by itself: however many there are, they displace only each other.
-    pub fn report(&self, what: Happening) {
-        self.record(what, true);
-    }
-
     /// Counts an event that was lost since its coordinator's inbox is full. That is told at once, and what comes after it at
     /// most once in [`limits::DROPS_TOLD`], with the next event that comes then.
     pub fn taken(&self, taken: Result<Put, NotAccepted>) {
@@ -177,7 +190,7 @@ impl Hub {
         }
         let now = self.clock.now();
         let events = {
-            let mut state = self.lock();
+            let mut state = self.state();
             state.dropped += u64::from(full);
             let soon = state.dropped_told.is_some_and(|told| now < told + limits::DROPS_TOLD);
             self.untold.store(soon && state.dropped > 0, Ordering::Relaxed);
@@ -188,42 +201,6 @@ impl Hub {
             std::mem::take(&mut state.dropped)
         };
         self.note(Happening::Dropped { events });
-    }
-
-    fn record(&self, what: Happening, is_report: bool) {
-        let now = self.clock.now();
-        let (entry, observers, taps) = {
-            let mut state = self.lock();
-            let heard = match &what {
-                Happening::Event { event, .. }
-                | Happening::Emitted { event }
-                | Happening::Lost { event, .. }
-                | Happening::Stale { event } => Some(event.clone()),
-                Happening::Answered(answered) => Some(answered.answer.clone()),
-                Happening::State { active } => {
-                    let of = active.first().and_then(|root| root.split_once(':')).map_or("", |(name, _)| name);
-                    state.active.insert(of.to_owned(), active.clone());
-                    None
-                }
-                _ => None,
-            };
-            if let Some(event) = heard {
-                state.heard.push(event, is_report);
-            }
-            state.epoch += 1;
-            let entry = Arc::new(LogEntry { at: now.as_secs_f64(), what });
-            state.log.push(entry.clone(), is_report);
-            // Under the lock, so that all hear it in one order.
-            state.taps.iter().for_each(|tap| tap.hear(&entry));
-            // Those who may have to be waited for.
-            let slow = if self.clock.is_simulated() { state.taps.clone() } else { Vec::new() };
-            (entry, state.observers.clone(), slow)
-        };
-        for observer in observers {
-            observer(now, &entry.what);
-        }
-        self.wake();
-        taps.iter().for_each(|tap| tap.keep_pace());
     }
 
     /// A number for an event that so many coordinators are given, to be asked with [`Hub::was_heard`] what became of it.

@@ -37,6 +37,7 @@ mod subscribers;
 mod subsystems;
 pub mod tap;
 mod wiring;
+mod writing;
 
 pub use halt::{StandsStill, StoppingView};
 pub use hub::{Hub, Observer};

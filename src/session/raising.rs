@@ -4,7 +4,7 @@ use super::Session;
 use super::log::Happening;
 use super::names::NotFromOutside;
 use super::parts::CoordinatorPart;
-use super::routes::{Acted, NO_MORE, make_safe};
+use super::routes::{Acted, Handles, NO_MORE, make_safe};
 use crate::coordinator::{Class, NotAccepted};
 use crate::model::{EventName, Ident};
 
@@ -47,7 +47,8 @@ impl Session {
         self.deliver(event, from, 0, |_| true).map(drop)
     }
 
-    /// The same to these coordinators alone: each hears of one event in its own time, and this is how that is tried.
+    /// The same to these coordinators alone, those of subsystems among them, also where it is given on to these: each hears of one event
+    /// in its own time, and this is how that is tried.
     ///
     /// # Errors
     /// As [`Session::offer`].
@@ -105,11 +106,14 @@ impl Session {
         }
         let subsystems = self.junction().subsystems();
         let path = subsystems.and_then(|subsystems| subsystems.path_of(event));
-        let to = |part: &&CoordinatorPart| to(part.name) && (subsystems.is_none() || part.of == path);
+        let given = |path: Option<Ident>| {
+            let is_of = move |part: &CoordinatorPart| subsystems.is_none() || part.of == path;
+            self.parts().iter().filter(move |part| is_of(part)).filter(|part| to(part.name))
+        };
         let incoming = self.junction().incoming(Class::Outside, event).watched(ticket);
         // All of them have room, or none hears of it.
         let (mut held, mut gone): (Vec<&CoordinatorPart>, bool) = (Vec::with_capacity(self.parts().len()), false);
-        for part in self.parts().iter().filter(to) {
+        for part in given(path) {
             match part.coordinator.hold(incoming.class) {
                 Ok(()) => held.push(part),
                 Err(NotAccepted::Full) if part.may_hear(event) => {
@@ -125,10 +129,11 @@ impl Session {
         self.junction().tell_leaving(self.configurator(), event);
         let acted = make_safe(self.hub(), self.configurator(), event, Class::Outside);
         // One of safety is given on to every subsystem that has it: whether it was heard is said there as well.
-        let inside: Vec<(EventName, Option<Ident>)> = subsystems.map_or(Vec::new(), |subsystems| {
-            subsystems.given_on(event).iter().map(|event| (*event, subsystems.path_of(*event))).collect()
+        let coordinators = |path| given(path).map(|part| part.coordinator.clone()).collect();
+        let inside: Vec<(EventName, Handles)> = subsystems.map_or(Vec::new(), |subsystems| {
+            subsystems.given_on(event).iter().map(|event| (*event, coordinators(subsystems.path_of(*event)))).collect()
         });
-        let given_on: usize = inside.iter().map(|(_, path)| self.junction().in_file(*path).len()).sum();
+        let given_on: usize = inside.iter().map(|(_, coordinators)| coordinators.len()).sum();
         (held.len() + given_on..self.parts().len()).for_each(|_| self.hub().taken_up(ticket, false));
         let (mut unwatched, mut missed) = (false, 0);
         {
@@ -151,9 +156,9 @@ impl Session {
             self.hub()
                 .note(Happening::Forced { note: format!("`{event}` was not delivered: the coordinator is gone") });
         }
-        for (event, path) in inside {
+        for (event, coordinators) in inside {
             let incoming = self.junction().incoming(Class::Outside, event).watched(ticket);
-            self.junction().give_to(self.hub(), path, incoming);
+            self.junction().give(self.hub(), coordinators, incoming);
         }
         if unwatched { Err(NotAccepted::Full.into()) } else { Ok(acted) }
     }

@@ -21,6 +21,9 @@ use std::time::Duration;
 /// Why the event that begins the deployment is heard by nobody then.
 pub(super) const NO_MORE: &str = "the deployment is being stopped, and does not come up again";
 
+/// Coordinators, mostly few: giving them an event asks for no memory.
+pub(super) type Handles = SmallVec<[CoordinatorHandle; 8]>;
+
 /// What the coordinators' and the configurator's threads need of each other: filled once both exist. Weak, so that
 /// neither keeps the other alive.
 #[derive(Default)]
@@ -72,10 +75,9 @@ impl Junction {
     }
 
     /// The coordinators of the subsystem of that path; none: of the deployment itself.
-    pub fn in_file(&self, path: Option<Ident>) -> Vec<CoordinatorHandle> {
-        let Some(subsystems) = self.subsystems() else { return self.all() };
-        let all = lock(&self.coordinators);
-        let own = all.iter().filter(|(name, _)| subsystems.is_for(path, *name));
+    pub fn in_file(&self, path: Option<Ident>) -> Handles {
+        let (subsystems, all) = (self.subsystems(), lock(&self.coordinators));
+        let own = all.iter().filter(|(name, _)| subsystems.is_none_or(|subsystems| subsystems.is_for(path, *name)));
         own.map(|(_, coordinator)| coordinator.clone()).collect()
     }
 
@@ -117,8 +119,8 @@ impl Junction {
     }
 
     /// Gives an event to these. What becomes of it is told when all of them have it: whoever hears that may raise another one.
-    fn give(&self, hub: &Hub, to: Vec<CoordinatorHandle>, incoming: Incoming) {
-        let delivered: SmallVec<[_; 4]> = {
+    pub fn give(&self, hub: &Hub, to: Handles, incoming: Incoming) {
+        let delivered: SmallVec<[_; 8]> = {
             let _giving = self.giving();
             to.iter().map(|coordinator| coordinator.deliver(incoming)).collect()
         };
@@ -133,11 +135,6 @@ impl Junction {
     /// The coordinator that asks under that name.
     pub fn coordinator(&self, name: Requester) -> Option<CoordinatorHandle> {
         lock(&self.coordinators).iter().find(|(own, _)| *own == name).map(|(_, coordinator)| coordinator.clone())
-    }
-
-    /// All of them.
-    pub fn all(&self) -> Vec<CoordinatorHandle> {
-        lock(&self.coordinators).iter().map(|(_, coordinator)| coordinator.clone()).collect()
     }
 }
 
@@ -325,7 +322,7 @@ impl ToConfigurator {
         if let Some((_, until)) = junction.leaving.filter(|(says, _)| alone && *says == event) {
             junction.give_all(&self.hub, Class::Report, until);
         }
-        let others: Vec<CoordinatorHandle> = lock(&junction.coordinators)
+        let others: Handles = lock(&junction.coordinators)
             .iter()
             .filter(|(name, other)| *name != self.name && other.chart().event(event) != EventId::OTHER)
             .map(|(_, other)| other.clone())
@@ -428,12 +425,12 @@ pub(super) fn on_platform(hub: &Hub, junction: &Junction, event: &PlatformEvent)
     let (event, from) = match event {
         PlatformEvent::Raised { event, component, .. } => {
             let heard = junction.subsystems().map(|subsystems| subsystems.heard_of(component.as_str(), *event));
-            (heard.unwrap_or(*event), component.to_string())
+            (heard.unwrap_or(*event), *component)
         }
         PlatformEvent::Faulted { component, reason, .. } => {
             hub.fault(component.as_str(), reason);
             let event = EventName::new(&format!("{component}{FAULTED}")).expect("a name with a suffix is one");
-            (event, component.to_string())
+            (event, *component)
         }
         PlatformEvent::Returned { component, .. } => {
             hub.clear_fault(component.as_str());
@@ -445,7 +442,7 @@ pub(super) fn on_platform(hub: &Hub, junction: &Junction, event: &PlatformEvent)
         hub.note(Happening::Forced { note: format!("`{event}` of `{from}` is passed over: {NO_MORE}") });
         return;
     }
-    hub.report(Happening::Event { event: event.to_string(), from, safety: hub.is_safety(event) });
+    hub.raised(event, from);
     hub.halt().report(event);
     let acts = || configurator.as_ref().and_then(|configurator| make_safe(hub, configurator, event, Class::Report));
     if let Some(configurator) = &configurator {

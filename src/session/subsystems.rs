@@ -76,6 +76,8 @@ pub(super) struct Subsystems {
     paths: FxHashMap<&'static str, Ident>,
     /// As what an event is heard that something in a subsystem raises, as far as somebody there waits for it.
     heard: FxHashMap<(Ident, EventName), EventName>,
+    /// The same of others, as they are raised.
+    unheard: Mutex<FxHashMap<(Ident, EventName), EventName>>,
     /// Safety events that are given on.
     safety: FxHashMap<EventName, Vec<EventName>>,
     /// Events that a parent may raise.
@@ -151,7 +153,8 @@ impl Subsystems {
                 .collect(),
         );
         let (clock, wake) = (clock.clone(), clock.signal());
-        Self { all: known, paths, heard, safety, accepted, of, lives, offered: Mutex::default(), clock, wake }
+        let unheard = Mutex::default();
+        Self { all: known, paths, heard, unheard, safety, accepted, of, lives, offered: Mutex::default(), clock, wake }
     }
 
     /// Whether there is none.
@@ -167,10 +170,24 @@ impl Subsystems {
         let path = component.rsplit_once('/').and_then(|(path, _)| self.paths.get(path));
         match path {
             Some(path) if event.local(*path).is_none() => {
-                self.heard.get(&(*path, event)).copied().unwrap_or_else(|| event.within(*path))
+                let known = self.heard.get(&(*path, event)).copied();
+                known.unwrap_or_else(|| self.unheard_of(*path, event))
             }
             _ => event,
         }
+    }
+
+    /// The same of an event that no coordinator there waits for: its name is made once, not each time it is raised.
+    fn unheard_of(&self, path: Ident, event: EventName) -> EventName {
+        let mut unheard = lock(&self.unheard);
+        if let Some(known) = unheard.get(&(path, event)) {
+            return *known;
+        }
+        let name = event.within(path);
+        if unheard.len() < limits::HEARD {
+            unheard.insert((path, event), name);
+        }
+        name
     }
 
     /// The path of the subsystem whose coordinators an event is for; none: those of the deployment itself.
@@ -179,8 +196,7 @@ impl Subsystems {
             return None;
         }
         let text = event.as_str();
-        let ends = text.match_indices('/').map(|(at, _)| at).collect::<Vec<_>>();
-        ends.into_iter().rev().find_map(|at| self.paths.get(&text[..at]).copied())
+        text.rmatch_indices('/').find_map(|(at, _)| self.paths.get(&text[..at]).copied())
     }
 
     /// Whether an event of that path is for a coordinator. What is emitted goes another way.

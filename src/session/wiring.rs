@@ -77,6 +77,7 @@ impl Session {
         let hub = Hub::new(&clock, deployment.configurations.iter().map(|c| c.id), emits);
         let safe = deployment.configurations.iter().filter(|c| c.safe).map(|c| c.id).collect();
         let hub = Arc::new(hub.with_safety(deployment.safety.iter().map(|(event, _)| *event), safe));
+        hub.begin_writing();
         let subsystems = Arc::new(Subsystems::new(&deployment, &clock));
         let junction = Arc::new(Junction::new(&deployment, subsystems.clone()));
         let steps = Arc::new(Steps::default());
@@ -475,6 +476,7 @@ impl Session {
         if let Some(evaluator) = &self.evaluator {
             evaluator.close();
         }
+        self.hub.end_writing();
         self.junction.close();
         lock(&self.junction.coordinators).clear();
         lock(&self.junction.configurator).take();

@@ -91,8 +91,13 @@ impl Signal {
     /// What [`Self::wait`] does before it gives the token away, for who waits without a thread: false when there is nothing
     /// to wait for, else `begin` has told how the wait is ended.
     pub(super) fn begin_wait(&self, deadline: Time, begin: impl FnOnce() -> WaitUntil) -> bool {
+        // On a simulated clock it is set under the same lock.
         let mut wait = lock(&self.inner.wait);
-        if self.inner.set.swap(false, Ordering::SeqCst) || self.clock.now() >= deadline {
+        if self.inner.set.load(Ordering::SeqCst) {
+            self.clear();
+            return false;
+        }
+        if self.clock.now() >= deadline {
             return false;
         }
         *wait = Some(begin());
@@ -101,6 +106,8 @@ impl Signal {
 
     /// What [`Self::wait`] does when the wait has ended.
     pub(super) fn clear(&self) {
-        self.inner.set.store(false, Ordering::SeqCst);
+        if self.inner.set.load(Ordering::SeqCst) {
+            self.inner.set.store(false, Ordering::SeqCst);
+        }
     }
 }

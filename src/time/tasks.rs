@@ -6,13 +6,13 @@
 //! hangs) keeps its thread, and another one goes on with the rest. The order of steps is that of threads.
 
 use super::clock::{Clock, Join, JoinError, TaskThread, TimeKind};
-use super::schedule::{Called, ClockTask, Id, TaskWait, WaitUntil};
+use super::schedule::{Called, ClockTask, Id, SchedulerState, TaskWait, WaitUntil};
 use super::simulated::Scheduler;
 use super::{Sender, Signal, Time, lock};
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::PoisonError;
 use std::sync::atomic::Ordering;
+use std::sync::{MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 
 /// A task, with what it is woken by and who is told of its end.
@@ -25,6 +25,9 @@ struct SignalledTask<F> {
     /// For the thread that has run its last step, which is joined with it.
     last: TaskThread,
 }
+
+/// What is known of the scheduler's participants, locked.
+type Locked<'s> = MutexGuard<'s, SchedulerState>;
 
 impl<F: FnMut() -> TaskWait + Send> ClockTask for SignalledTask<F> {
     fn step(&mut self) -> TaskWait {
@@ -115,12 +118,12 @@ impl Scheduler {
             };
             drop(state);
             self.be(id);
-            let Some(task) = self.run_until_it_waits(id, task) else {
+            let Some((task, locked)) = self.run_until_it_waits(id, task) else {
                 self.leave();
                 return;
             };
             self.be_nobody(id);
-            state = lock(&self.state);
+            state = locked;
             if let Some(participant) = state.participants.get_mut(&id) {
                 participant.task = Some(task);
             }
@@ -135,30 +138,34 @@ impl Scheduler {
         }
     }
 
-    /// The task, which waits now; none: it has ended.
-    fn run_until_it_waits(&self, id: Id, mut task: Box<dyn ClockTask>) -> Option<Box<dyn ClockTask>> {
+    /// The task, which waits now, and what is locked since it does; none: it has ended.
+    fn run_until_it_waits(&self, id: Id, mut task: Box<dyn ClockTask>) -> Option<(Box<dyn ClockTask>, Locked<'_>)> {
         loop {
-            let waits = match catch_unwind(AssertUnwindSafe(|| task.step())) {
-                Ok(TaskWait::Wait(deadline)) => task.begin_wait(deadline, &mut || {
-                    let mut state = lock(&self.state);
-                    self.begin_wait(&mut state, id, deadline)
-                }),
+            let mut waits = None;
+            match catch_unwind(AssertUnwindSafe(|| task.step())) {
+                Ok(TaskWait::Wait(deadline)) => {
+                    task.begin_wait(deadline, &mut || {
+                        let mut state = lock(&self.state);
+                        let wait = self.begin_wait(&mut state, id, deadline);
+                        waits = Some(state);
+                        wait
+                    });
+                }
                 Ok(TaskWait::Pause(until)) => {
                     let mut state = lock(&self.state);
-                    let later = until > Time(self.now.load(Ordering::Relaxed));
-                    if later {
+                    if until > Time(self.now.load(Ordering::Relaxed)) {
                         self.begin_wait(&mut state, id, until);
+                        waits = Some(state);
                     }
-                    later
                 }
                 ended => {
                     let own = lock(&self.state).runners.remove(&std::thread::current().id());
                     task.end(ended.err(), own);
                     return None;
                 }
-            };
-            if waits {
-                return Some(task);
+            }
+            if let Some(locked) = waits {
+                return Some((task, locked));
             }
         }
     }

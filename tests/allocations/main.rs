@@ -1,4 +1,4 @@
-//! What costs nothing where it must not: no allocation in control activities, prepared switches, requests, monitors and steps of pure
+//! What costs nothing where it must not: no allocation in control activities, events that are raised, prepared switches, requests, monitors and steps of pure
 //! charts, and work that does not grow; and few where thousands of states are followed. Counted by the allocator, for each test in its own threads, so that tests may run beside each
 //! other.
 
@@ -9,6 +9,7 @@ mod counting;
 #[path = "../support/family.rs"]
 mod family;
 mod monitors;
+mod raising;
 mod requests;
 mod switch;
 mod updates;

@@ -206,3 +206,22 @@ fn force_lowers_the_arm_of_who_is_not_held() {
         assert!(!ended.forced.iter().any(|note| note.contains("`left/park`")), "{ended:?}");
     });
 }
+
+/// To whom an event is raised is said of those inside of subsystems, too: what is given on goes to nobody else.
+#[test]
+fn an_event_of_safety_is_given_to_whom_it_is_meant_for_alone() {
+    let script = tempfile::Builder::new().suffix(".lua").tempfile().unwrap();
+    let deployment = concat!(env!("CARGO_MANIFEST_DIR"), "/deployments/youbot_coupling.yaml");
+    let text = format!(
+        "deploy({deployment:?})
+         for _, robot in ipairs{{ 'left', 'right' }} do wait_state(robot .. ':copying', 20) end
+         raise('e_estop', {{ to = {{}} }})
+         wait(0.2)
+         for _, robot in ipairs{{ 'left', 'right' }} do wait_state(robot .. ':copying', 0) end
+         raise('e_estop', {{ to = {{ 'left' }} }})
+         wait_state('left:fault', 0.01)
+         wait_state('right:operational', 0)"
+    );
+    std::fs::write(script.path(), text).unwrap();
+    crate::scenarios::script(script.path(), &[]);
+}

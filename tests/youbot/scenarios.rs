@@ -8,10 +8,11 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Each with what is set for it here: what takes a minute in the file is shorter.
-const SCENARIOS: [(&str, &[(&str, &str)]); 31] = [
+const SCENARIOS: [(&str, &[(&str, &str)]); 32] = [
     ("beside", &[]),
     ("blocked", &[]),
     ("bring_up", &[]),
+    ("clocks", &[]),
     ("configurator", &[]),
     ("crash", &[]),
     ("driver", &[]),
@@ -85,6 +86,19 @@ fn every_scenario_is_run() {
     assert_eq!(files, listed);
 }
 
+/// What is shorter here is run at its full length by CI.
+#[test]
+fn what_is_shortened_is_run_whole_by_ci() {
+    let ci = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(".ci/run")).unwrap();
+    let listed = ci.lines().find_map(|line| line.strip_prefix("scenarios=\"")?.strip_suffix('"')).expect("a list");
+    let listed: BTreeSet<&str> = listed.split(' ').collect();
+    for (name, set) in SCENARIOS {
+        assert!(set.is_empty() || listed.contains(name), "{name}");
+    }
+    let known = SCENARIOS.map(|(name, _)| name);
+    assert!(listed.iter().all(|name| known.contains(name)), "{listed:?}");
+}
+
 #[test]
 fn beside() {
     run("beside");
@@ -98,6 +112,11 @@ fn blocked() {
 #[test]
 fn bring_up() {
     run("bring_up");
+}
+
+#[test]
+fn clocks() {
+    run("clocks");
 }
 
 #[test]

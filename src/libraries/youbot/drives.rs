@@ -80,6 +80,8 @@ pub struct DriveParameters {
     pub soft_limit: f64,
     /// Share at which outward torque is zero.
     pub scale_end: f64,
+    /// Whether they slow down a joint that comes near its highest speed, also against what is commanded.
+    pub speed_limit: bool,
 }
 
 impl Default for DriveParameters {
@@ -90,6 +92,7 @@ impl Default for DriveParameters {
             base_timeout: 1.0,
             soft_limit: 0.80,
             scale_end: 0.85,
+            speed_limit: true,
         }
     }
 }
@@ -348,7 +351,7 @@ impl Drives {
             (DriveMode::MotorStop | DriveMode::Torque, _) => J5::zeros(),
         };
         torque = self.handover.over(&torque, &self.torque, dt);
-        if self.mode == DriveMode::Torque {
+        if self.mode == DriveMode::Torque && self.parameters.speed_limit {
             // Behind a period that was missed that is more than it was: it brakes a little early.
             let gained = (self.measured.qd - self.last_speed) / dt;
             torque = within_speed(&torque, &self.measured.qd, &gained, &self.parameters.tau_max);

@@ -54,7 +54,7 @@ impl ArmPlant {
     /// `at` is where its parts are now: who moves it has worked that out.
     pub fn step(&mut self, at: &Posture, torque: &J5, force: &Vector3<f64>, base: &BaseMotion, braked: bool, dt: f64) {
         let (mut mass, bias) = self.model.mass_and_bias(at, &self.qd, base);
-        let mut push = at.jacobian().tr_mul(force) - bias;
+        let mut push = at.torque_of(force) - bias;
         if !braked {
             push += torque;
         }
@@ -100,15 +100,17 @@ impl ArmPlant {
 /// is not, the arm stands.
 fn with_friction(mass: &M5, momentum: &J5, most: &J5, guess: J5) -> J5 {
     let mut v = guess;
+    let own = mass.diagonal();
+    if own.min() <= 0.0 {
+        return J5::zeros();
+    }
+    let mobility = own.map(f64::recip);
     for _ in 0..SWEEPS {
         let mut change: f64 = 0.0;
         for i in 0..JOINTS {
-            if mass[(i, i)] <= 0.0 {
-                return J5::zeros();
-            }
             // It is symmetric, and its columns lie together.
-            let left = momentum[i] - mass.column(i).dot(&v) + mass[(i, i)] * v[i];
-            let next = (left - left.clamp(-most[i], most[i])) / mass[(i, i)];
+            let left = momentum[i] - mass.column(i).dot(&v) + own[i] * v[i];
+            let next = (left - left.clamp(-most[i], most[i])) * mobility[i];
             change = change.max((next - v[i]).abs());
             v[i] = next;
         }

@@ -69,6 +69,14 @@ impl RigidBody {
     }
 }
 
+/// An inertia seen from the frame that `r` leads to: `r * inertia * rᵀ`, half of which is the other half.
+fn turned(inertia: &Matrix3<f64>, r: &Matrix3<f64>) -> Matrix3<f64> {
+    let half = r * inertia;
+    let at = |i: usize, j: usize| half[(i, 0)] * r[(j, 0)] + half[(i, 1)] * r[(j, 1)] + half[(i, 2)] * r[(j, 2)];
+    let (xy, xz, yz) = (at(0, 1), at(0, 2), at(1, 2));
+    Matrix3::new(at(0, 0), xy, xz, xy, at(1, 1), yz, xz, yz, at(2, 2))
+}
+
 /// A body about the origin of the base's frame: of several as one it is the sum.
 #[derive(Debug, Clone, Copy)]
 struct Inertia {
@@ -168,7 +176,7 @@ impl ArmModel {
     fn bodies(&self, at: &Posture) -> [RigidBody; JOINTS] {
         std::array::from_fn(|i| {
             let (r, b) = (at.rotations[i].matrix(), &self.links[i]);
-            RigidBody { mass: b.mass, com: at.origins[i] + r * b.com, inertia: r * b.inertia * r.transpose() }
+            RigidBody { mass: b.mass, com: at.origins[i] + r * b.com, inertia: turned(&b.inertia, r) }
         })
     }
 
@@ -286,6 +294,12 @@ impl Posture {
             out.set_column(i, &self.axes[i].cross(&(self.tool - self.origins[i])));
         }
         out
+    }
+
+    /// Joint torques that a force on the tool comes to, in N m: the transposed [`Self::jacobian`] times the force.
+    pub fn torque_of(&self, force: &Vector3<f64>) -> J5 {
+        // Each the joint's share of the force's moment about it.
+        J5::from_fn(|i, _| self.axes[i].dot(&(self.tool - self.origins[i]).cross(force)))
     }
 
     /// Angular velocity of the tool at joint speeds `qd`, in rad/s.

@@ -10,7 +10,7 @@ use super::samples::{
 use super::{aged, going_on};
 use crate::libraries::youbot::drives::{DriveHappening, DriveMode, DriveOutput, DriveParameters, Drives, Measured};
 use crate::libraries::youbot::motors::{Encoders, HeatChange, HeatLimit};
-use crate::libraries::youbot::parameters::{GEAR, JOINTS, PARK_POSE_DEG, TORQUE_CONSTANT, TORQUE_LIMIT};
+use crate::libraries::youbot::parameters::{GEAR, JOINTS, PARK_POSE_DEG, SPEED_LIMIT, TORQUE_CONSTANT, TORQUE_LIMIT};
 use crate::libraries::youbot::rigid_body::{J5, radians};
 use crate::model::{EventName, Tunable};
 use crate::runtime::{Builder, Component, Context, EventOut, In, Out, Prop, Ticket};
@@ -65,6 +65,7 @@ pub struct Driver {
     scale_end: Prop<f64>,
     encoders: Prop<bool>,
     heat_limit: Prop<bool>,
+    speed_limit: Prop<bool>,
     comm_fault: Prop<String>,
     ifname: Prop<String>,
     names: Events,
@@ -181,6 +182,12 @@ impl Component for Driver {
                      Else tau_max for ever.",
                 )
                 .property("heat_limit", false),
+            speed_limit: b
+                .doc(&format!(
+                    "Drives that take torques slow down a joint that comes near {SPEED_LIMIT} rad/s, whatever is commanded; else it gets what is \
+                     commanded at any speed."
+                ))
+                .property("speed_limit", p.speed_limit),
             comm_fault: b
                 .doc(&format!("Fault to inject: none, {}.", FAULTS.each_ref().map(|fault| fault.name).join(", ")))
                 .property("comm_fault", "none".to_owned()),
@@ -226,6 +233,7 @@ impl Component for Driver {
             base_timeout: self.base_timeout.get(),
             soft_limit: self.soft_limit.get(),
             scale_end: self.scale_end.get(),
+            speed_limit: self.speed_limit.get(),
         };
         if self.comm_fault.changed() {
             let wanted = self.comm_fault.get_ref().clone();

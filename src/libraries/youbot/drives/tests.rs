@@ -1,6 +1,7 @@
 //! What the drives do, without a component around them.
 
 use super::super::motors::Encoders;
+use super::super::parameters::SPEED_LIMIT;
 use super::super::world::RobotBody;
 use super::*;
 use nalgebra::Vector3;
@@ -425,4 +426,24 @@ fn an_arm_that_brushes_past_something_soft_is_not_taken_for_another_one() {
         assert!(pressed > 1.0 && !drives.busy(), "{table} {wall}: {pressed} N");
         assert_eq!(drives.identified(), None, "{table} {wall}");
     }
+}
+
+#[test]
+fn the_speed_limit_may_be_switched_off() {
+    let fastest = |speed_limit: bool| {
+        let mut drives = up();
+        drives.set_mode(DriveMode::Torque).unwrap();
+        drives.parameters.speed_limit = speed_limit;
+        let mut fastest = 0.0_f64;
+        for _ in 0..600 {
+            let mut effort = drives.body.arm.model.gravity(&drives.body.arm.posture());
+            effort[4] += 1.2;
+            drives.update(Some((effort, 0.0)), None, &Vector3::zeros(), 0.001, &mut |_| {});
+            fastest = fastest.max(drives.body.arm.qd[4]);
+        }
+        fastest
+    };
+    let (limited, free) = (fastest(true), fastest(false));
+    assert!(limited < SPEED_LIMIT && limited > 1.2, "{limited} rad/s");
+    assert!(free > 1.5 * SPEED_LIMIT, "{free} rad/s");
 }
