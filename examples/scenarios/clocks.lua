@@ -23,7 +23,6 @@ local function measure(name, seconds)
     signals[robot .. "_active"] = robot .. "/Cart_Impedance.active"
     for _, what in ipairs{ "age", "clock_offset" } do signals[robot .. "_" .. what] = robot .. "/Link_Rx.link_stats." .. what end
   end
-  local from = now()
   local s = sample{ every = 0.005, name = name:gsub("%W+", "_"), signals = signals }
   wait(seconds)
   s:stop()
