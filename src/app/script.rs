@@ -388,6 +388,11 @@ fn raise(host: &SharedHost, name: &str, to: Option<Vec<String>>) -> mlua::Result
         };
         error(format!("{why}: {help}"))
     })?;
+    let given_to = session.given_to(event);
+    if let Some(other) = to.iter().flatten().find(|name| !given_to.contains(name)) {
+        let given_to = given_to.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
+        return Err(error(format!("`{name}` is no event of the coordinator `{other}`: it is given to {given_to}")));
+    }
     listen_anew(host, &session);
     let offered = match to {
         Some(to) => session.offer_to(event, &to, "script"),

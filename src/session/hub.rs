@@ -12,7 +12,7 @@ use super::writing::UnwrittenEvent;
 use crate::coordinator::{NotAccepted, Put};
 use crate::limits;
 use crate::model::{Ask, ConfigId, EventName, Raise, RequestId};
-use crate::time::{Clock, Signal, Time};
+use crate::time::{Clock, Signal, Time, lock};
 use rustc_hash::{FxHashMap, FxHashSet};
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -34,8 +34,11 @@ pub struct Hub {
     untold: AtomicBool,
     /// Wakes whoever drives the session.
     pub changed: Signal,
-    /// Wakes the thread that writes down what components raise.
-    pub(super) unwritten: Signal,
+    /// What components have raised, oldest first, and nobody has written down yet. Its own lock, so that whoever raises something waits for
+    /// nobody who writes.
+    pub(super) unwritten: Mutex<VecDeque<UnwrittenEvent>>,
+    /// Wakes the thread that writes it down.
+    pub(super) raised: Signal,
     /// There is such a thread.
     pub(super) is_written: AtomicBool,
     /// Wakes threads outside the clock (those of the control socket).
@@ -53,8 +56,8 @@ pub(super) struct HubState {
     outstanding: FxHashMap<RequestId, Outstanding>,
     faults: Vec<ComponentFault>,
     pub(super) log: Log,
-    /// What components have raised, oldest first, and nobody has written down yet.
-    pub(super) unwritten: VecDeque<UnwrittenEvent>,
+    /// Room for what components have raised, while it is written down.
+    pub(super) taken: VecDeque<UnwrittenEvent>,
     pub(super) observers: Vec<Observer>,
     pub(super) taps: Vec<Arc<dyn LogSink>>,
     /// The newest answers and events, for those who wait for one.
@@ -110,7 +113,7 @@ impl Hub {
                 outstanding: FxHashMap::default(),
                 faults: Vec::new(),
                 log: Log::default(),
-                unwritten: VecDeque::with_capacity(limits::UNWRITTEN),
+                taken: UnwrittenEvent::room(),
                 observers: Vec::new(),
                 taps: Vec::new(),
                 heard: Lanes::new(limits::HEARD, limits::HEARD),
@@ -123,7 +126,8 @@ impl Hub {
             }),
             untold: AtomicBool::new(false),
             changed: clock.signal(),
-            unwritten: clock.signal(),
+            unwritten: Mutex::new(UnwrittenEvent::room()),
+            raised: clock.signal(),
             is_written: AtomicBool::new(false),
             outside: Condvar::new(),
             configurations: configurations.into_iter().collect(),
@@ -157,12 +161,9 @@ impl Hub {
     /// With all written down that there is: whoever looks sees what happened before. It may be an observer that looks, so none is
     /// waited for.
     fn lock(&self) -> MutexGuard<'_, HubState> {
-        let state = self.state();
-        if state.unwritten.is_empty() {
-            return state;
+        if !lock(&self.unwritten).is_empty() {
+            self.catch_up(None);
         }
-        drop(state);
-        self.catch_up(None);
         self.state()
     }
 

@@ -56,6 +56,15 @@ impl Session {
         self.deliver(event, from, 0, |name| to.contains(&name)).map(drop)
     }
 
+    /// The coordinators to which an event from outside is given: those of the file whose event it is, and of one of safety those of the
+    /// subsystems that it is given on to.
+    pub fn given_to(&self, event: EventName) -> Vec<Ident> {
+        let Some(subsystems) = self.junction().subsystems() else { return self.coordinators() };
+        let all = std::iter::once(&event).chain(subsystems.given_on(event));
+        let paths: Vec<Option<Ident>> = all.map(|event| subsystems.path_of(*event)).collect();
+        self.parts().iter().filter(|part| paths.contains(&part.of)).map(|part| part.name).collect()
+    }
+
     /// The same as [`raise`](Self::raise); the hub (`was_heard`) says with the number that this answers what became of it, until it is
     /// forgotten.
     ///

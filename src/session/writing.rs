@@ -9,8 +9,9 @@ use super::log::{Happening, LogEntry};
 use super::tap::LogSink;
 use crate::limits;
 use crate::model::{ComponentName, EventName};
-use crate::time::{TaskWait, Time};
+use crate::time::{TaskWait, Time, lock};
 use smallvec::SmallVec;
+use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
@@ -20,6 +21,13 @@ pub(super) struct UnwrittenEvent {
     event: EventName,
     by: ComponentName,
     safety: bool,
+}
+
+impl UnwrittenEvent {
+    /// Room for as many as there may be, and for those of who raises one meanwhile.
+    pub fn room() -> VecDeque<Self> {
+        VecDeque::with_capacity(2 * limits::UNWRITTEN)
+    }
 }
 
 impl Hub {
@@ -36,14 +44,14 @@ impl Hub {
     /// The same, of an event that a component raised. Whoever raises it, a control activity mostly, makes no texts of it and calls
     /// nobody: that does whoever notes or looks next, at the latest the thread that is there for it.
     pub fn raised(&self, event: EventName, by: ComponentName) {
-        let (at, safety) = (self.clock.now(), self.is_safety(event));
+        let safety = self.is_safety(event);
         let waiting = {
-            let mut state = self.state();
-            state.unwritten.push_back(UnwrittenEvent { at, event, by, safety });
-            state.unwritten.len()
+            let mut unwritten = lock(&self.unwritten);
+            unwritten.push_back(UnwrittenEvent { at: self.clock.now(), event, by, safety });
+            unwritten.len()
         };
         match waiting < limits::UNWRITTEN && self.is_written.load(Ordering::Acquire) {
-            true => self.unwritten.notify(),
+            true => self.raised.notify(),
             false => self.write_down(),
         }
     }
@@ -57,7 +65,7 @@ impl Hub {
             if hub.is_written.load(Ordering::Acquire) { TaskWait::Wait(Time::NEVER) } else { TaskWait::End }
         };
         self.is_written.store(true, Ordering::Release);
-        if self.clock.try_spawn_task("davit-log", &self.unwritten, step).is_err() {
+        if self.clock.try_spawn_task("davit-log", &self.raised, step).is_err() {
             self.end_writing();
         }
     }
@@ -65,7 +73,7 @@ impl Hub {
     /// Ends that thread.
     pub fn end_writing(&self) {
         self.is_written.store(false, Ordering::Release);
-        self.unwritten.notify();
+        self.raised.notify();
         self.write_down();
     }
 
@@ -81,11 +89,16 @@ impl Hub {
 
     /// The same without waiting; answers who may have to be waited for.
     pub(super) fn catch_up(&self, what: Option<(Happening, bool)>) -> Vec<Arc<dyn LogSink>> {
-        let now = self.clock.now();
         let (news, observers, taps) = {
             let mut state = self.state();
+            // What is raised from here on comes later, also by the clock.
+            let now = {
+                let mut unwritten = lock(&self.unwritten);
+                std::mem::swap(&mut *unwritten, &mut state.taken);
+                self.clock.now()
+            };
             let mut news: SmallVec<[(Time, Arc<LogEntry>); 2]> = SmallVec::new();
-            while let Some(UnwrittenEvent { at, event, by, safety }) = state.unwritten.pop_front() {
+            while let Some(UnwrittenEvent { at, event, by, safety }) = state.taken.pop_front() {
                 let what = Happening::Event { event: event.to_string(), from: by.to_string(), safety };
                 news.push((at, state.write(at, what, true)));
             }
@@ -128,5 +141,60 @@ impl HubState {
         self.log.push(entry.clone(), is_report);
         self.taps.iter().for_each(|tap| tap.hear(&entry));
         entry
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::time::Clock;
+    use std::sync::Mutex;
+
+    /// When what is written down happened, in the order in which it is.
+    #[derive(Default)]
+    struct Times(Mutex<Vec<f64>>);
+
+    impl LogSink for Times {
+        fn hear(&self, entry: &Arc<LogEntry>) {
+            lock(&self.0).push(entry.at);
+        }
+    }
+
+    #[test]
+    fn what_threads_raise_and_note_at_once_is_written_in_the_order_of_its_times() {
+        const EACH: usize = 20_000;
+        let hub = Arc::new(Hub::new(&Clock::real(), [], []));
+        let times = Arc::new(Times::default());
+        hub.attach(times.clone());
+        hub.begin_writing();
+        let (event, by) = (EventName::new("e_blink").unwrap(), ComponentName::new("A").unwrap());
+        std::thread::scope(|scope| {
+            for _ in 0..2 {
+                scope.spawn(|| (0..EACH).for_each(|_| hub.raised(event, by)));
+                scope.spawn(|| {
+                    (0..EACH).for_each(|_| hub.note(Happening::Stale { event: "e".to_owned() }));
+                });
+            }
+        });
+        hub.end_writing();
+        let times = lock(&times.0);
+        assert_eq!(times.len(), 4 * EACH, "nothing is lost, and nothing is told twice");
+        let back = times.windows(2).filter(|pair| pair[1] < pair[0]).count();
+        assert_eq!(back, 0, "times go back");
+    }
+
+    #[test]
+    fn who_looks_sees_what_was_raised_before() {
+        let clock = Clock::simulated();
+        let _guard = clock.enter();
+        let hub = Arc::new(Hub::new(&clock, [], []));
+        hub.begin_writing();
+        let (event, by) = (EventName::new("e_blink").unwrap(), ComponentName::new("A").unwrap());
+        let before = hub.heard();
+        hub.raised(event, by);
+        assert_eq!(hub.first_heard(&["e_blink".to_owned()], before), Some("e_blink".to_owned()));
+        (0..3 * limits::UNWRITTEN).for_each(|_| hub.raised(event, by));
+        assert_eq!(hub.heard(), before + 1 + 3 * limits::UNWRITTEN as u64);
+        hub.end_writing();
     }
 }

@@ -216,6 +216,10 @@ fn an_event_of_safety_is_given_to_whom_it_is_meant_for_alone() {
         "deploy({deployment:?})
          for _, robot in ipairs{{ 'left', 'right' }} do wait_state(robot .. ':copying', 20) end
          raise('e_estop', {{ to = {{}} }})
+         -- Nor does a slip in it make it nobody's.
+         assert(not pcall(raise, 'e_estop', {{ to = {{ a = 'left' }} }}))
+         assert(not pcall(raise, 'e_shutdown', {{ to = 'left' }}))
+         assert(not pcall(raise, 'left/e_estop', {{ to = 'right' }}))
          wait(0.2)
          for _, robot in ipairs{{ 'left', 'right' }} do wait_state(robot .. ':copying', 0) end
          raise('e_estop', {{ to = {{ 'left' }} }})
