@@ -102,7 +102,7 @@ fn while_up<B: Component>(file: &str, count: &'static Together) -> (u64, u64) {
     let clock = Clock::simulated_paced(1e9);
     let _guard = clock.enter();
     let libraries = Libraries::new().with(Library::new("test").with::<B>("Blinker"));
-    let activities = read.deployment.activities.iter().map(|(name, activity)| (*name, activity.clone())).collect();
+    let activities = read.deployment.activities.iter().map(|(name, activity)| (*name, *activity)).collect();
     let charts: Vec<_> =
         read.deployment.charts().map(|written| Arc::new(compile(written).0.expect("a chart"))).collect();
     let session = Session::start(SessionSetup {
