@@ -232,6 +232,7 @@ pub const FUNCTIONS: &[&str] = &[
     "system",
     "stack",
     "active",
+    "log",
     "now",
     "say",
     "fault",
@@ -310,6 +311,7 @@ fn install(lua: &Lua, host: &SharedHost) -> mlua::Result<()> {
         values::to_lua(lua, &stack)
     });
     function!("active", (), |h, lua, ()| lua.create_sequence_from(session(h)?.hub().active()));
+    function!("log", Option<Table>, |h, lua, options| looks::log(h, lua, options));
     function!("now", (), |h, _lua, ()| Ok(clock(h).now().as_secs_f64()));
     function!("say", String, |h, _lua, text| {
         (h.borrow().options.say)(&text);

@@ -46,6 +46,38 @@ fn a_signal_is_what_the_port_carries_now() {
 }
 
 #[test]
+fn the_log_is_what_davit_log_prints_from_a_time_on() {
+    let ran = hello(
+        "local all = log()
+         assert(all[1].at == 0 and all[1].what == 'phase' and all[1].phase == 'deploying')
+         for i = 2, #all do assert(all[i - 1].at <= all[i].at, 'oldest first') end
+         wait(0.5)
+         local asked = now()
+         assert(#log{ since = asked } == 0)
+         raise('e_loud')
+         wait_answer('loud.ok', 1)
+         local seen = {}
+         for _, it in ipairs(log{ since = asked }) do
+           assert(it.at == asked)
+           table.insert(seen, it.what)
+           if it.answer == 'loud.ok' then
+             assert(it.what == 'answered' and it.ok and it.by == 'hello' and it.reasons == nil)
+             assert(#it.steps == 1 and it.steps[1].outcome == 'done', it.steps[1].outcome)
+           end
+         end
+         assert(table.concat(seen, ' ') == 'event state requested requested answered answered', table.concat(seen, ' '))
+         assert(#log() == #all + #seen and #log{ since = 1e9 } == 0)
+         shutdown()",
+        &["--quiet"],
+    );
+    assert_eq!(ran.code, 0, "{}{}", ran.out, ran.err);
+    assert!(refused("log{ from = 1 }").contains("`log`: there is no option `from`: known options: `since`"));
+    assert!(refused("log{ since = 'now' }").contains("`log`: `since` is a number, and this is of the type string"));
+    assert!(refused("log{ since = 0/0 }").contains("`log`: `since` is not a number"));
+    assert!(refused("shutdown() log()").contains("nothing is deployed"));
+}
+
+#[test]
 fn an_in_port_that_nothing_drives_is_what_was_written() {
     let demo = Demo::new();
     let ran = script(

@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Each with what is set for it here: what takes a minute in the file is shorter.
-const SCENARIOS: [(&str, &[(&str, &str)]); 32] = [
+const SCENARIOS: [(&str, &[(&str, &str)]); 33] = [
     ("beside", &[]),
     ("blocked", &[]),
     ("bring_up", &[]),
@@ -22,6 +22,7 @@ const SCENARIOS: [(&str, &[(&str, &str)]); 32] = [
     ("hang", &[]),
     ("hang_in_bring_up", &[]),
     ("late", &[]),
+    ("latency", &[]),
     ("left_alone", &[("cases", "4")]),
     ("link", &[]),
     ("modes", &[]),
@@ -157,6 +158,11 @@ fn hang() {
 #[test]
 fn hang_in_bring_up() {
     run("hang_in_bring_up");
+}
+
+#[test]
+fn latency() {
+    run("latency");
 }
 
 #[test]

@@ -1,9 +1,11 @@
-//! What a script looks at: components, their states, properties and in-ports.
+//! What a script looks at: components, their states, properties and in-ports, and what happened.
 
+use super::options::OptionFields;
 use super::{SharedHost, error, session, values};
+use crate::limits;
 use crate::model::finding::did_you_mean;
 use crate::model::{ComponentName, ComponentSnapshot, Ident, MemberRef, RunState, Snapshot};
-use mlua::{Lua, Value as LuaValue};
+use mlua::{Lua, Table, Value as LuaValue};
 
 /// The system, as far as anybody knows it.
 pub(super) fn system(host: &SharedHost) -> mlua::Result<Snapshot> {
@@ -73,4 +75,18 @@ pub(super) fn port(host: &SharedHost, lua: &Lua, text: &str) -> mlua::Result<Lua
     }
     let help = did_you_mean(name.member.as_str(), "in-ports", ins.iter().map(Ident::as_str));
     Err(error(format!("`{}` has no in-port `{}`: {help}", name.component, name.member)))
+}
+
+/// What happened in the deployment, oldest first, as `davit log --json` prints it: from the time `since` on (seconds of the clock), as far
+/// back as the log of a session reaches.
+pub(super) fn log(host: &SharedHost, lua: &Lua, options: Option<Table>) -> mlua::Result<LuaValue> {
+    let since = OptionFields::of("log", options, &["since"])?.number("since")?.unwrap_or(f64::NEG_INFINITY);
+    if since.is_nan() {
+        return Err(error("`log`: `since` is not a number"));
+    }
+    let mut entries = session(host)?.hub().log(limits::LOG_ENTRIES);
+    // In the order of their times: what comes later is not earlier.
+    entries.drain(..entries.partition_point(|entry| entry.at < since));
+    let entries: Vec<_> = entries.iter().map(|entry| &**entry).collect();
+    values::to_lua(lua, &entries)
 }
