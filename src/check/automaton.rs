@@ -3,12 +3,10 @@
 //!
 //! It may do everything that was followed of the subsystem, and more: where states are taken for one, each may do what any of them does.
 
+#[cfg(test)]
+use super::automaton_draft::AutomatonDraft;
 use super::state::Failed;
 use crate::model::EventName;
-use petgraph::algo::kosaraju_scc;
-use petgraph::graph::{DiGraph, NodeIndex};
-use rustc_hash::{FxBuildHasher, FxHashMap};
-use std::hash::BuildHasher;
 
 /// What leads from one state of an interface automaton to another.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -27,7 +25,7 @@ pub enum InterfaceAction {
 }
 
 /// What leads on from a state.
-type InterfaceEdges = Vec<(InterfaceAction, u32)>;
+pub(super) type InterfaceEdges = Vec<(InterfaceAction, u32)>;
 
 /// A state of an interface automaton by itself.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
@@ -50,19 +48,23 @@ pub struct InterfaceAutomaton {
 
 impl InterfaceAutomaton {
     /// The automaton of these states, as small as it becomes. `edges` have the states as numbers.
+    #[cfg(test)]
     pub fn new(
         edges: impl IntoIterator<Item = (u32, InterfaceAction, u32)>,
         states: Vec<InterfaceState>,
         start: u32,
     ) -> Self {
-        let mut whole = Self { edges: vec![Vec::new(); states.len()], states, start };
-        for (from, by, to) in edges {
-            whole.edges[from as usize].push((by, to));
+        let mut draft = AutomatonDraft::default();
+        for state in states {
+            draft.add(state);
         }
-        let whole = whole.merged(&whole.silent_rounds());
-        let whole = whole.merged(&whole.passed_through());
-        let whole = whole.merged(&whole.alike());
-        whole.merged(&whole.passed_through())
+        edges.into_iter().for_each(|(from, by, to)| draft.lead(from, by, to));
+        draft.finished(start)
+    }
+
+    /// One of which all is known; `edges` in their order, each once.
+    pub(super) fn of(edges: Vec<InterfaceEdges>, states: Vec<InterfaceState>, start: u32) -> Self {
+        Self { edges, states, start }
     }
 
     /// What leads on from a state.
@@ -81,136 +83,9 @@ impl InterfaceAutomaton {
     }
 
     /// How many states it has.
+    #[cfg(test)]
     pub fn len(&self) -> usize {
         self.edges.len()
-    }
-
-    /// Of each state the number of those that it leads to and that lead back, all silently.
-    fn silent_rounds(&self) -> Vec<u32> {
-        let mut graph: DiGraph<(), (), u32> = DiGraph::with_capacity(self.len(), self.len());
-        for _ in &self.edges {
-            graph.add_node(());
-        }
-        for (from, edges) in self.edges.iter().enumerate() {
-            let silent = edges.iter().filter(|(by, _)| *by == InterfaceAction::Silent);
-            for (_, to) in silent {
-                graph.add_edge(NodeIndex::new(from), NodeIndex::new(*to as usize), ());
-            }
-        }
-        let mut of = vec![0; self.len()];
-        for (number, states) in (0u32..).zip(kosaraju_scc(&graph)) {
-            states.into_iter().for_each(|state| of[state.index()] = number);
-        }
-        of
-    }
-
-    /// Of each state the number of the one that it becomes silently, where it can do nothing else.
-    fn passed_through(&self) -> Vec<u32> {
-        let next = |at: u32| match self.edges[at as usize][..] {
-            [(InterfaceAction::Silent, to)] if self.state(at) == self.state(to) => Some(to),
-            _ => None,
-        };
-        let mut names: FxHashMap<u32, u32> = FxHashMap::default();
-        let mut of = Vec::with_capacity(self.len());
-        for at in (0u32..).take(self.len()) {
-            // There are no rounds of such steps any more.
-            let mut last = at;
-            for _ in 0..self.len() {
-                let Some(to) = next(last) else { break };
-                last = to;
-            }
-            let name = u32::try_from(names.len()).unwrap_or(u32::MAX);
-            of.push(*names.entry(last).or_insert(name));
-        }
-        of
-    }
-
-    /// Of each state the number of those that do the same (bisimilar; silent steps among them count for nothing): the coarsest partition that
-    /// is stable, by splitting. A state is looked at anew only where one that it leads to was split off.
-    fn alike(&self) -> Vec<u32> {
-        let mut before: Vec<Vec<u32>> = vec![Vec::new(); self.len()];
-        for (from, edges) in (0u32..).zip(&self.edges) {
-            edges.iter().for_each(|(_, to)| before[*to as usize].push(from));
-        }
-        let block = |state: &InterfaceState| u32::from(state.down) + 2 * u32::from(state.failed);
-        let mut of: Vec<u32> = self.states.iter().map(block).collect();
-        // Of each block how many are in it, and what those of it do that need not be looked at.
-        let mut sizes = vec![0_usize; 4];
-        of.iter().for_each(|block| sizes[*block as usize] += 1);
-        let mut does: Vec<Option<u64>> = vec![None; 4];
-        let mut dirty: Vec<u32> = (0u32..).zip(&of).map(|(at, _)| at).collect();
-        while !dirty.is_empty() {
-            let mut groups: FxHashMap<(u32, u64), Vec<u32>> = FxHashMap::default();
-            let mut looked_at: FxHashMap<u32, usize> = FxHashMap::default();
-            for at in std::mem::take(&mut dirty) {
-                let block = of[at as usize];
-                // That two of so many numbers are the same by chance makes one state of two, which may do more then, and never less.
-                let seen = FxBuildHasher.hash_one(self.seen_as(at as usize, &of));
-                groups.entry((block, seen)).or_default().push(at);
-                *looked_at.entry(block).or_default() += 1;
-            }
-            // Where all of a block was looked at, the first of its groups keeps the name.
-            for (block, count) in looked_at {
-                if count == sizes[block as usize] {
-                    does[block as usize] = None;
-                }
-            }
-            let mut groups: Vec<_> = groups.into_iter().collect();
-            groups.sort_unstable_by_key(|(_, states)| states[0]);
-            for ((block, seen), states) in groups {
-                let known = does[block as usize].get_or_insert(seen);
-                if *known == seen {
-                    continue;
-                }
-                let new = u32::try_from(sizes.len()).unwrap_or(u32::MAX);
-                sizes.push(states.len());
-                sizes[block as usize] -= states.len();
-                does.push(Some(seen));
-                for at in states {
-                    of[at as usize] = new;
-                    // A silent step to the rest of the block is one that counts from now on.
-                    dirty.push(at);
-                    dirty.extend(before[at as usize].iter().copied());
-                }
-            }
-            dirty.sort_unstable();
-            dirty.dedup();
-        }
-        of
-    }
-
-    /// What a state does where states are taken for one.
-    fn seen_as(&self, at: usize, of: &[u32]) -> InterfaceEdges {
-        let told = self.edges[at].iter().map(|(by, to)| (*by, of[*to as usize]));
-        let mut does: InterfaceEdges =
-            told.filter(|(by, to)| *by != InterfaceAction::Silent || *to != of[at]).collect();
-        does.sort_unstable();
-        does.dedup();
-        does
-    }
-
-    /// The same with the states of one number as one.
-    fn merged(&self, of: &[u32]) -> Self {
-        // Numbers that nothing has are none.
-        let mut numbers: Vec<u32> = of.to_vec();
-        numbers.sort_unstable();
-        numbers.dedup();
-        let name = |number: &u32| u32::try_from(numbers.partition_point(|of| of < number)).unwrap_or(u32::MAX);
-        let of: Vec<u32> = of.iter().map(name).collect();
-        let (of, len) = (&of[..], numbers.len());
-        let mut edges = vec![InterfaceEdges::new(); len];
-        let mut states = vec![InterfaceState { down: true, failed: true }; len];
-        for at in 0..self.len() {
-            let into = of[at] as usize;
-            edges[into].extend(self.seen_as(at, of));
-            states[into].down &= self.states[at].down;
-            states[into].failed &= self.states[at].failed;
-        }
-        for edges in &mut edges {
-            edges.sort_unstable();
-            edges.dedup();
-        }
-        Self { edges, states, start: of[self.start as usize] }
     }
 }
 

@@ -4,6 +4,7 @@
 //! it; times that are over may be over at any moment.
 
 use super::automaton::{InterfaceAction, InterfaceAutomaton, InterfaceState};
+use super::automaton_draft::AutomatonDraft;
 use super::edges::Edge;
 use super::explore::Graph;
 use super::neighbours::ParentInterface;
@@ -16,7 +17,7 @@ use crate::model::subsystem::{IGNORED, SeenStanding, standing};
 use crate::model::{Deployment, EventName, SubsystemStanding};
 use crate::statechart::EventId;
 use indexmap::IndexMap;
-use rustc_hash::{FxBuildHasher, FxHashMap};
+use rustc_hash::{FxBuildHasher, FxHashMap, FxHashSet};
 use std::collections::BTreeSet;
 
 /// Where a subsystem is.
@@ -38,10 +39,14 @@ struct Deriving<'g, 'p, 'a> {
     parent: &'g ParentInterface,
     begins: EventName,
     ends: EventName,
+    /// What the parent waits for.
+    hears: FxHashSet<EventName>,
+    /// The events that tell how it stands, and that one was ignored.
+    standings: FxHashMap<SubsystemStanding, EventName>,
+    ignored: FxHashMap<EventName, Option<EventName>>,
     seen: FxHashMap<u32, SeenStanding>,
     places: IndexMap<ShownPlace, u32, FxBuildHasher>,
-    states: Vec<InterfaceState>,
-    edges: Vec<(u32, InterfaceAction, u32)>,
+    draft: AutomatonDraft,
 }
 
 impl Graph<'_, '_> {
@@ -50,8 +55,11 @@ impl Graph<'_, '_> {
         let deployment: &Deployment = self.product.deployment;
         let (begins, ends) = (deployment.deploy.event, deployment.shutdown.event);
         let (seen, places) = (FxHashMap::default(), IndexMap::default());
-        let (states, edges) = (Vec::new(), Vec::new());
-        let mut deriving = Deriving { graph: self, parent, begins, ends, seen, places, states, edges };
+        let hears = parent.hears.iter().copied().collect();
+        let standings = FxHashMap::default();
+        let (ignored, draft) = (FxHashMap::default(), AutomatonDraft::default());
+        let mut deriving =
+            Deriving { graph: self, parent, begins, ends, hears, standings, ignored, seen, places, draft };
         let start = deriving.at(ShownPlace {
             state: 0,
             told: Some(SubsystemStanding::Down),
@@ -67,7 +75,7 @@ impl Graph<'_, '_> {
             deriving.standings(place, number);
             deriving.moves(place, number);
         }
-        Some(InterfaceAutomaton::new(deriving.edges, deriving.states, start))
+        Some(deriving.draft.finished(start))
     }
 }
 
@@ -83,8 +91,7 @@ impl Deriving<'_, '_, '_> {
     }
 
     fn fresh(&mut self, down: bool, failed: Failed) -> u32 {
-        self.states.push(InterfaceState { down, failed: failed != Failed::Nothing });
-        u32::try_from(self.states.len() - 1).unwrap_or(u32::MAX)
+        self.draft.add(InterfaceState { down, failed: failed != Failed::Nothing })
     }
 
     /// What is told by itself.
@@ -93,14 +100,14 @@ impl Deriving<'_, '_, '_> {
         let product = &*self.graph.product;
         let seen = *self.seen.entry(state).or_insert_with(|| product.seen_as_one(&self.graph.states[state as usize]));
         // Whose lateness nobody waits for is not told apart from others.
-        let waits = |word: SubsystemStanding| self.parent.hears.contains(&word.own_event());
-        let late = told.is_none() && waits(SubsystemStanding::Failed);
+        let late = told.is_none() && self.waits_for(SubsystemStanding::Failed);
         let late = SeenStanding { late, stranded: ending, ..seen };
         let (in_time, late) = (standing(told, seen), standing(told, late));
         for now in in_time.into_iter().chain(late.filter(|late| in_time != Some(*late))) {
             let still = ending && now != SubsystemStanding::Down;
             let to = self.at(ShownPlace { told: Some(now), ending: still, ..place });
-            self.tells(number, failed, &[now.own_event()], to);
+            let told = self.standing(now);
+            self.tells(number, failed, &[told], to);
         }
     }
 
@@ -112,7 +119,7 @@ impl Deriving<'_, '_, '_> {
         if graph.product.worlds.top(at.world).is_some() && graph.product.is_down(at) {
             // What is left is taken away by force, and it is as at the start.
             let to = self.at(ShownPlace { state: 0, ..place });
-            self.edges.push((number, InterfaceAction::Silent, to));
+            self.draft.lead(number, InterfaceAction::Silent, to);
             return;
         }
         let mut taken: BTreeSet<EventName> = BTreeSet::new();
@@ -152,10 +159,20 @@ impl Deriving<'_, '_, '_> {
         }
     }
 
+    /// The event that tells how it stands: its name is looked up once.
+    fn standing(&mut self, standing: SubsystemStanding) -> EventName {
+        *self.standings.entry(standing).or_insert_with(|| standing.own_event())
+    }
+
+    fn waits_for(&mut self, standing: SubsystemStanding) -> bool {
+        let event = self.standing(standing);
+        self.hears.contains(&event)
+    }
+
     /// Where it is when it has taken an event up there.
-    fn after(&self, place: ShownPlace, event: EventName) -> ShownPlace {
+    fn after(&mut self, place: ShownPlace, event: EventName) -> ShownPlace {
         let begins = event == self.begins && place.told == Some(SubsystemStanding::Down);
-        let minds = self.parent.hears.contains(&SubsystemStanding::Stranded.own_event());
+        let minds = self.waits_for(SubsystemStanding::Stranded);
         let ending = minds && (event == self.ends || place.ending && event != self.begins);
         match begins {
             true => ShownPlace { told: None, ending, failed: Failed::Nothing, ..place },
@@ -178,13 +195,14 @@ impl Deriving<'_, '_, '_> {
         tells: &SharedList<EventName>,
         to: u32,
     ) {
-        let ignored = (!heeded).then(|| EventName::new(&format!("{event}{IGNORED}")).ok()).flatten();
+        let told_ignored = || EventName::new(&format!("{event}{IGNORED}")).ok();
+        let ignored = if heeded { None } else { *self.ignored.entry(event).or_insert_with(told_ignored) };
         let tells: Vec<EventName> = ignored.into_iter().chain(tells.iter().copied()).collect();
-        let taken = match tells.iter().any(|event| self.parent.hears.contains(event)) {
+        let taken = match tells.iter().any(|event| self.hears.contains(event)) {
             true => self.fresh(false, failed),
             false => to,
         };
-        self.edges.push((from, InterfaceAction::Takes { event, heeded }, taken));
+        self.draft.lead(from, InterfaceAction::Takes { event, heeded }, taken);
         if taken != to {
             self.tells(taken, failed, &tells, to);
         }
@@ -192,18 +210,18 @@ impl Deriving<'_, '_, '_> {
 
     /// It tells these one after the other, as far as its parent waits for them, where this has failed.
     fn tells(&mut self, from: u32, failed: Failed, events: &[EventName], to: u32) {
-        let told: Vec<EventName> = events.iter().filter(|event| self.parent.hears.contains(event)).copied().collect();
+        let told: Vec<EventName> = events.iter().filter(|event| self.hears.contains(event)).copied().collect();
         let Some((last, before)) = told.split_last() else {
-            self.edges.push((from, InterfaceAction::Silent, to));
+            self.draft.lead(from, InterfaceAction::Silent, to);
             return;
         };
         let mut at = from;
         for event in before {
             let next = self.fresh(false, failed);
-            self.edges.push((at, InterfaceAction::Tells(*event, failed), next));
+            self.draft.lead(at, InterfaceAction::Tells(*event, failed), next);
             at = next;
         }
-        self.edges.push((at, InterfaceAction::Tells(*last, failed), to));
+        self.draft.lead(at, InterfaceAction::Tells(*last, failed), to);
     }
 }
 

@@ -52,8 +52,8 @@ pub struct Graph<'p, 'a> {
     pub(super) pushes: FxHashMap<(ConfigId, Requester), Vec<u32>>,
     /// In which worlds cycles that push one were gone round.
     pub(super) gone_round: FxHashMap<(ConfigId, Requester), FxHashSet<WorldId>>,
-    /// Behind undoings that failed only one batch at a time is followed, and no races.
-    lean: Option<bool>,
+    /// How many transitions there were when the first was looked at that comes behind an undo that failed.
+    pub(super) before_undo: Option<usize>,
     out: OnceCell<Adjacency>,
     into: OnceCell<Adjacency>,
     pub(super) depth: Vec<u32>,
@@ -101,7 +101,7 @@ pub fn explore<'p, 'a>(product: &'p mut Product<'a>) -> Graph<'p, 'a> {
         bounds: FxHashMap::default(),
         pushes: FxHashMap::default(),
         gone_round: FxHashMap::default(),
-        lean: None,
+        before_undo: None,
         out: OnceCell::new(),
         into: OnceCell::new(),
         depth: Vec::new(),
@@ -215,10 +215,9 @@ impl Graph<'_, '_> {
             return;
         }
         let depth = self.depth[at as usize] + 1;
-        if so_far >= Failed::Undo && self.lean.is_none() {
-            let lean = self.edges.len() > limits::CHECK_LEAN;
-            self.lean = Some(lean);
-            if lean {
+        if so_far >= Failed::Undo && self.before_undo.is_none() {
+            self.before_undo = Some(self.edges.len());
+            if self.is_lean(at) {
                 self.cut(Bound::Lean, so_far);
             }
         }
@@ -340,7 +339,8 @@ impl Graph<'_, '_> {
     }
 
     fn is_lean(&self, at: u32) -> bool {
-        self.lean == Some(true) && self.failed[at as usize] >= Failed::Undo
+        self.failed[at as usize] >= Failed::Undo
+            && self.before_undo.is_some_and(|before| self.product.behind.is_lean(before))
     }
 
     /// What follows from a state: always the same.

@@ -14,6 +14,7 @@ use super::aside::Aside;
 use super::children::{Child, WatchedSubsystem};
 use super::coordinator::outside_events;
 use super::coupling;
+use super::deeper::Behind;
 use super::desks::{Desks, PlainBatch};
 use super::effort::{Effort, Left};
 use super::from_outside::FromOutside;
@@ -70,6 +71,8 @@ pub struct Product<'a> {
     pub races: bool,
     /// Batches of one coordinator that may be unanswered when the next event comes.
     pub most_waiting: usize,
+    /// How much is followed behind an undo that fails.
+    pub(super) behind: Behind,
     /// Configurations that may be lost, and whether they stand for something. Those that do not are lost where the platform is
     /// found to differ: followed where somebody listens.
     pub losable: Vec<(ConfigId, bool)>,
@@ -154,6 +157,7 @@ impl<'a> Product<'a> {
             forked: false,
             races: true,
             most_waiting: limits::CHECK_WAITING,
+            behind: Behind::default(),
             losable,
             tells_all: false,
             minds_stopping,
@@ -207,11 +211,9 @@ impl<'a> Product<'a> {
         }
     }
 
-    /// Nothing was followed in it yet, with so many batches of one coordinator that may wait; what was planned in its worlds
-    /// stays known.
-    pub fn follow_anew(&mut self, most_waiting: usize) {
+    /// Nothing was followed in it yet; what was planned in its worlds stays known.
+    pub fn follow_anew(&mut self) {
         (self.overflow, self.forked) = (false, false);
-        self.most_waiting = most_waiting;
     }
 
     /// The state after the first entries; none when one of them cannot be entered.

@@ -2,6 +2,7 @@
 
 use super::automaton::InterfaceAutomaton;
 use super::bound::Bound;
+use super::deeper::Deeper;
 use super::driven::DrivenPorts;
 use super::effort::Effort;
 use super::explore::explore;
@@ -16,7 +17,6 @@ use super::{
     monitors as watched, paths, purity, safety, settings, simulated, types, undriven, unhandled, universe, unwatched,
     ways,
 };
-use crate::limits;
 use crate::model::codes::{CLASH, POST_ON_DESTROYED, PRE_ON_CREATED, TOUCHES_DESTROYED};
 use crate::model::{
     Catalogue, Code, ConfigId, Deployment, EventName, Finding, Findings, MemberRef, Severity, StepFault,
@@ -203,45 +203,26 @@ fn follow(
             apart.stands_in(around);
         }
         let product = apart.as_mut().unwrap_or(&mut product);
-        let (mut most_waiting, mut by_hand) = (limits::CHECK_WAITING, true);
+        let mut deeper = Deeper::new();
         loop {
-            product.follow_anew(most_waiting);
+            product.follow_anew();
             product.effort = product.most_believed();
             let mut graph = explore(product);
+            if let Some(more) = deeper.too_much(&graph) {
+                product.follow_more(more, false);
+                continue;
+            }
             if graph.product.knows_children() && graph.is_used_up() {
                 // With all that is known of them there is too much of it.
                 graph.product.forget_children();
                 graph.product.follow_with(effort);
                 continue;
             }
-            // Anew with more of them where they are few: often there never are more at once.
-            let whole = graph.product.effort.halted().is_none();
-            let easy = graph.edges.len() <= limits::CHECK_EASY && most_waiting < limits::CHECK_WAITING_MOST;
-            let minds = graph.product.minds_stopping;
-            if whole && easy && graph.bounds.contains_key(&Bound::Waiting) {
-                most_waiting += 1;
+            if let Some(more) = deeper.next(&graph) {
+                product.follow_more(more, true);
                 continue;
             }
-            if whole && !minds && graph.edges.len() <= limits::CHECK_STOPPING {
-                product.minds_stopping = true;
-                continue;
-            }
-            let waits = graph.product.waits_for_others();
-            if whole && waits && graph.edges.len() <= limits::CHECK_STOPPING {
-                product.begins_anew = true;
-                continue;
-            }
-            let few = graph.edges.len() <= limits::CHECK_BY_HAND;
-            if whole && graph.bounds.contains_key(&Bound::ByHand) && few && by_hand {
-                product.follows_by_hand = true;
-                continue;
-            }
-            if graph.product.follows_by_hand && graph.is_used_up() {
-                // It was not.
-                (by_hand, product.follows_by_hand) = (false, false);
-                continue;
-            }
-            if !minds {
+            if !graph.product.minds_stopping {
                 graph.cut(Bound::Stopping, Failed::Nothing);
             }
             if graph.product.elsewhere.is_some() {
@@ -250,7 +231,7 @@ fn follow(
             if graph.product.knows_no_order() {
                 graph.cut(Bound::Told, Failed::Nothing);
             }
-            if waits {
+            if graph.product.waits_for_others() {
                 graph.cut(Bound::Anew, Failed::Nothing);
             }
             if graph.product.others && graph.goes_on_when_down(true) {
@@ -268,7 +249,9 @@ fn follow(
             let verified = !cut.iter().any(|bound| graph.bounds.contains_key(bound));
             let shared = coupling::shared(deployment, charts, &numbers, verified);
             found.extend(shared.into_iter().map(|finding| (finding, Vec::new())));
-            left.extend(graph.bounds.iter().map(|(bound, failed)| bound.told(*failed, most_waiting, &effort)));
+            left.extend(
+                graph.bounds.iter().map(|(bound, failed)| bound.told(*failed, graph.product.most_waiting, &effort)),
+            );
             explored = explored.and(graph.explored());
             if let Some(parent) = around.parent.as_ref().filter(|_| numbers == all && verified && pure) {
                 shows = graph.derived(parent).map(Arc::new);

@@ -100,7 +100,7 @@ fn memory(bytes: u64) -> String {
     format!("{}{unit}", bytes / times)
 }
 
-/// As it is read: `600000`, `600000,2GB`, `500000states`.
+/// As it is read: `800000`, `800000,2GB`, `500000states`.
 impl std::fmt::Display for CheckBudget {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let transitions = self.bounds_transitions().then(|| self.transitions.to_string());
@@ -297,9 +297,9 @@ mod tests {
             ("2M", 2_000_000, None, None, "2000000"),
             ("0.5k", 500, None, None, "500"),
             ("1.25g", 1_000_000_000, None, None, ""),
-            ("2 GB", usual, None, Some(2_000_000_000), "600000,2GB"),
+            ("2 GB", usual, None, Some(2_000_000_000), "800000,2GB"),
             ("1.5GB, 7", 7, None, Some(1_500_000_000), "7,1500MB"),
-            ("9B", usual, None, Some(9), "600000,9B"),
+            ("9B", usual, None, Some(9), "800000,9B"),
             ("500Kstates", most, Some(500_000), None, "500000states"),
             ("1 state, 2M", 2_000_000, Some(1), None, "2000000,1states"),
             ("0.5M STATES,1GB", most, Some(500_000), Some(1_000_000_000), "500000states,1GB"),

@@ -1,8 +1,8 @@
 //! How much `check` follows, and at how much of each thing it looks.
 
 /// Events and answers that `check` follows through a coordinator before it says that it has not seen everything, unless
-/// `--budget` says otherwise. About a second of work; one robot of the youBot coupling beside another one needs 364,000.
-pub const CHECK_TRANSITIONS: usize = 600_000;
+/// `--budget` says otherwise. About a second of work; one robot of the youBot coupling beside another one needs 487,000.
+pub const CHECK_TRANSITIONS: usize = 800_000;
 
 /// Events and answers that are followed of a parent with all that is known of the order in which its subsystems tell things. Where there are
 /// more it is followed with subsystems that may tell anything in any order: that has fewer states, and may refuse too much.
@@ -10,7 +10,7 @@ pub const CHECK_BELIEVED: usize = 300_000;
 
 /// States of a subsystem, each as often as it differs in what its parent was told and in what has failed, up to which an interface automaton is
 /// made of them. One with more may tell anything in any order.
-pub const CHECK_PLACES: usize = 100_000;
+pub const CHECK_PLACES: usize = 400_000;
 
 /// The largest number of transitions that `--budget` takes, and of states.
 pub const CHECK_TRANSITIONS_MOST: usize = 1_000_000_000;
@@ -35,7 +35,7 @@ pub const CHECK_ROUNDS: usize = 4;
 
 /// Transitions of several coordinators up to which they are followed anew with it in mind whether the event that ends the
 /// deployment has come: that makes up to twice as many of each state.
-pub const CHECK_STOPPING: usize = 20_000;
+pub const CHECK_STOPPING: usize = 150_000;
 
 /// Transitions up to which they are followed anew with what an operator's safe configuration leads to: that makes many times
 /// as many.
@@ -49,8 +49,11 @@ pub const CHECK_PROBED: usize = 10_000;
 pub const CHECK_PROBE: usize = 50_000;
 
 /// Transitions on which no undo fails from which on `check` follows only one batch of a coordinator at a time behind an undo
-/// that fails, and says so: where that many things can happen, those behind are too many, and hardly other ones.
+/// that fails, and says so, where following all there is behind one was too much for the budget.
 pub const CHECK_LEAN: usize = 5_000;
+
+/// Transitions up to which, where it was so for another reason, all is followed behind one after all.
+pub const CHECK_BEHIND: usize = 100_000;
 
 /// Configurations whose frames may be left by undos that failed, from which on that is known of one at a time: of fewer there are no more
 /// subsets than that needs states.

@@ -218,9 +218,9 @@ fn each_file_is_followed_alone_and_their_product_never() {
     let alone = check::run(arm.clone(), &catalogue(&arm)).explored;
     let parents = together.explored.states - 2 * alone.states;
     assert!(alone.states > 20 && parents > 20, "{alone:?} {:?}", together.explored);
-    let effort = Effort { together: true, transitions: 100_000, ..Effort::default() };
+    let effort = Effort { together: true, ..Effort::default() };
     let product = check::run_with(whole.clone(), &catalogue(&whole), effort).explored;
-    assert!(!product.complete && product.states > 5 * together.explored.states, "{product:?} {:?}", together.explored);
+    assert!(product.states > 5 * together.explored.states, "{product:?} {:?}", together.explored);
     // What is wrong in a file that is there twice is told once.
     let told = |code: &str| together.findings.iter().filter(|finding| finding.code.0 == code).count();
     let in_arm = check::run(arm.clone(), &catalogue(&arm)).findings;

@@ -83,7 +83,7 @@ fn a_budget_that_is_none_is_told() {
         assert!(ran.code == 2 && ran.err.contains(told), "{budget}: {}", ran.err);
     }
     let help = at_home(&["check", "--help"]).out;
-    assert!(help.contains("[default: 600000]"), "{help}");
+    assert!(help.contains("[default: 800000]"), "{help}");
 }
 
 /// It watches for signals once it follows.
