@@ -10,7 +10,7 @@ pub const CHECK_BELIEVED: usize = 300_000;
 
 /// States of a subsystem, each as often as it differs in what its parent was told and in what has failed, up to which an interface automaton is
 /// made of them. One with more may tell anything in any order.
-pub const CHECK_PLACES: usize = 400_000;
+pub const CHECK_PLACES: usize = 100_000;
 
 /// The largest number of transitions that `--budget` takes, and of states.
 pub const CHECK_TRANSITIONS_MOST: usize = 1_000_000_000;

@@ -14,6 +14,12 @@ fn a_part_of_something_larger_is_not_deployed_alone() {
     assert!(told.len() == 1 && told[0]["severity"] == "info", "{findings:#?}");
     let whole = at_home(&["check", "deployments/youbot_coupling.yaml", "--json"]).json();
     assert!(!whole["findings"].to_string().contains("deploy::part"), "it is where it belongs");
+    // And of the whole everything was followed that the budget has room for: what is behind an undo that failed, and whether one event
+    // leads all coordinators down.
+    let left: Vec<&str> = whole["left"].as_array().unwrap().iter().filter_map(Value::as_str).collect();
+    for unknown in ["--budget", "before it was answered", "leads all coordinators down"] {
+        assert!(!left.is_empty() && !left.iter().any(|line| line.contains(unknown)), "{left:#?}");
+    }
 
     let demo = Demo::new();
     let path = format!("{}/{PART}", env!("CARGO_MANIFEST_DIR"));
