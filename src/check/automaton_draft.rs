@@ -40,6 +40,21 @@ impl AutomatonDraft {
         self.edges.push((from, by, to));
     }
 
+    /// The automaton of these states. `edges` have them as numbers.
+    #[cfg(test)]
+    pub fn whole(
+        edges: impl IntoIterator<Item = (u32, InterfaceAction, u32)>,
+        states: Vec<InterfaceState>,
+        start: u32,
+    ) -> InterfaceAutomaton {
+        let mut draft = Self::default();
+        for state in states {
+            draft.add(state);
+        }
+        edges.into_iter().for_each(|(from, by, to)| draft.lead(from, by, to));
+        draft.finished(start)
+    }
+
     /// The automaton.
     pub fn finished(self, start: u32) -> InterfaceAutomaton {
         let Self { actions, states, edges } = self;
@@ -222,5 +237,50 @@ impl Merging {
         let edges = self.all().map(of_edge);
         let edges = edges.filter(|(from, by, to)| *by != SILENT || from != to);
         Self::new(edges, states, of[self.start as usize])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::check::state::Failed;
+    use crate::model::EventName;
+
+    const WELL: InterfaceAction = InterfaceAction::Silent;
+
+    fn tells(event: &str) -> InterfaceAction {
+        InterfaceAction::Tells(name(event), Failed::Nothing)
+    }
+
+    fn plain(states: usize) -> Vec<InterfaceState> {
+        vec![InterfaceState::default(); states]
+    }
+
+    fn name(text: &str) -> EventName {
+        EventName::new(text).unwrap()
+    }
+
+    #[test]
+    fn states_that_show_the_same_are_one_and_no_others() {
+        // Two ways of a hundred steps; at the end of one of them something is told.
+        let chain = |last: Option<&str>| {
+            let mut edges = vec![(0, WELL, 1), (0, WELL, 101), (100, tells("up"), 201)];
+            edges.extend((1..100).chain(101..200).map(|at| (at, WELL, at + 1)));
+            edges.extend(last.map(|event| (201, tells(event), 0)));
+            AutomatonDraft::whole(edges, plain(202), 0).len()
+        };
+        // The start, what tells, and what leads nowhere.
+        assert_eq!(chain(None), 3);
+        assert_eq!(chain(Some("down")), 4);
+        // In two places at once it is one: what it may do is told apart by what has to be told first.
+        let ring = (0..100).flat_map(|at| [(at, WELL, (at + 1) % 100), (at, tells("up"), 100)]);
+        assert_eq!(AutomatonDraft::whole(ring, plain(101), 0).len(), 2);
+    }
+
+    #[test]
+    fn silent_rounds_are_one_state() {
+        let edges = [(0, WELL, 1), (1, WELL, 2), (2, WELL, 0), (1, tells("up"), 3)];
+        let whole = AutomatonDraft::whole(edges, plain(4), 0);
+        assert_eq!((whole.len(), whole.leads(whole.start()).len()), (2, 1), "{whole:?}");
     }
 }

@@ -162,8 +162,9 @@ fn is_told(event: EventName, untaken: [u8; MOST_UNTAKEN]) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::super::automaton::InterfaceState;
     use super::*;
+    use crate::check::automaton::InterfaceState;
+    use crate::check::automaton_draft::AutomatonDraft;
 
     fn name(text: &str) -> EventName {
         EventName::new(text).unwrap()
@@ -193,7 +194,7 @@ mod tests {
         (states[0].down, states[5].failed) = (true, true);
         let takes = vec![(name("e_start"), Precedence::UrgentAsLast), (name("e_shutdown"), Precedence::UrgentAsLast)];
         let heard = ["up", "down", "failed"].map(name).into();
-        Beliefs::new(Arc::new(InterfaceAutomaton::new(edges, states, 0)), takes, others, heard)
+        Beliefs::new(Arc::new(AutomatonDraft::whole(edges, states, 0)), takes, others, heard)
     }
 
     fn told(beliefs: &mut Beliefs, belief: u32) -> Vec<(String, Failed)> {

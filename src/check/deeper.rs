@@ -1,6 +1,7 @@
 //! Following anew with more of what makes many times as many states, where it was little. Where that turns out to be too much, what is known is
 //! what was followed before.
 
+use super::behind::Behind;
 use super::bound::Bound;
 use super::explore::Graph;
 use super::product::Product;
@@ -19,30 +20,6 @@ pub(super) enum More {
     Anew,
     /// What an operator's safe configuration leads to.
     ByHand,
-}
-
-/// What is followed behind an undo that fails: all, or one batch of a coordinator at a time, and no races.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) enum Behind {
-    /// All where little comes before one fails, and where it is so much that what an operator's safe configuration leads to is not followed
-    /// anyway: what lies between is kept small for that.
-    #[default]
-    AsItFits,
-    /// All.
-    All,
-    /// All where little comes before one fails.
-    Little,
-}
-
-impl Behind {
-    /// Whether only one batch at a time is followed, where before an undo fails there are so many transitions.
-    pub fn is_lean(self, before: usize) -> bool {
-        match self {
-            Self::AsItFits => before > limits::CHECK_LEAN && before <= limits::CHECK_BY_HAND,
-            Self::All => false,
-            Self::Little => before > limits::CHECK_LEAN,
-        }
-    }
 }
 
 /// What has been tried.

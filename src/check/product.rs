@@ -11,10 +11,10 @@
 //! inboxes are empty.
 
 use super::aside::Aside;
+use super::behind::Behind;
 use super::children::{Child, WatchedSubsystem};
 use super::coordinator::outside_events;
 use super::coupling;
-use super::deeper::Behind;
 use super::desks::{Desks, PlainBatch};
 use super::effort::{Effort, Left};
 use super::from_outside::FromOutside;
