@@ -160,11 +160,15 @@ impl Component for Driver {
             wrong: b.doc("Faults that were not acknowledged, a bit each.").output("wrong"),
             events: b.doc("Limits, watchdogs, errors.").event_output("events"),
             names: Names {
-                faults: FAULTS.map(|(_, event, _)| b.event(event)),
-                command_watchdog: b.event("e_cmd_watchdog"),
-                unwatched: b.event("e_watch_lost"),
-                soft_limit: b.event("e_JNT_SOFT_LIMIT_EXEEDED"),
-                soft_limit_exit: b.event("e_JNT_SOFT_LIMIT_EXEEDED_EXIT"),
+                faults: FAULTS.map(|(_, event, what)| b.doc(what).event(event)),
+                command_watchdog: b
+                    .doc("Nothing was commanded in mode 2 for too long: they hold by themselves.")
+                    .event("e_cmd_watchdog"),
+                unwatched: b.doc("Whoever watches was silent for 40 ms in mode 2.").event("e_watch_lost"),
+                soft_limit: b.doc("An axis is beyond the soft limit of its range.").event("e_JNT_SOFT_LIMIT_EXEEDED"),
+                soft_limit_exit: b
+                    .doc("All axes are within the soft limits again.")
+                    .event("e_JNT_SOFT_LIMIT_EXEEDED_EXIT"),
             },
             drives: Drives::default(),
             faults: 0,

@@ -1,13 +1,14 @@
 //! The coordinator against the deployment: what it asks for, what it waits for, which states the deployment names.
 
 use super::paths;
+use super::slips::KnownEvents;
 use crate::model::codes::{
-    COORD_ANSWER_NEVER_COMES, COORD_NEAR_EVENT, COORD_NEVER_EMITTED, COORD_UNKNOWN_ANSWER, COORD_UNKNOWN_REQUEST,
-    DEPLOY_EVENT_UNHEARD, DEPLOY_UNKNOWN_STATE,
+    COORD_ANSWER_NEVER_COMES, COORD_NEVER_EMITTED, COORD_UNKNOWN_ANSWER, COORD_UNKNOWN_REQUEST, DEPLOY_EVENT_UNHEARD,
+    DEPLOY_UNKNOWN_STATE,
 };
-use crate::model::finding::{closest, did_you_mean, nearest};
+use crate::model::finding::{did_you_mean, nearest};
 use crate::model::statechart::is_internal;
-use crate::model::{Ask, ConfigId, Deployment, EventName, FAULTED, Finding, Findings, Monitor, Raise, Verdict};
+use crate::model::{Ask, ConfigId, Deployment, EventName, Finding, Findings, Raise, Verdict};
 use crate::statechart::{Chart, EdgeId, EventId, FindError, NodeId, RaiseMoment};
 use std::collections::BTreeSet;
 
@@ -24,17 +25,12 @@ pub fn bad_answers(ask: Ask) -> [EventName; 2] {
     [ask.failed().event(ask), ask.broken().event(ask)]
 }
 
-/// What is wrong between the coordinator and the deployment. `told`: what coordinators raise; `waited_for`: what transitions of any of them list.
-pub fn check(
-    deployment: &Deployment,
-    chart: &Chart,
-    told: &BTreeSet<EventName>,
-    waited_for: &BTreeSet<EventName>,
-) -> Findings {
+/// What is wrong between the coordinator and the deployment.
+pub fn check(deployment: &Deployment, chart: &Chart, known: &KnownEvents<'_>) -> Findings {
     let mut findings = Vec::new();
     states(deployment, chart, &mut findings);
     raised(deployment, chart, &mut findings);
-    heard(deployment, chart, (told, waited_for), &mut findings);
+    heard(deployment, chart, known, &mut findings);
     findings
 }
 
@@ -177,86 +173,25 @@ fn raised(deployment: &Deployment, chart: &Chart, findings: &mut Findings) {
     }
 }
 
-/// That nobody raises an event, since it was meant to be another one: a time event, or the fault of a component.
-fn never_raised(deployment: &Deployment, event: &str) -> Option<Finding> {
-    if let Some((head, inner)) = event.split_once('(') {
-        let near = closest(head, ["e_after", "e_at"]);
-        let message = format!("`{event}` is no time event: somebody must raise it under that very name");
-        return Some(Finding::warning(COORD_NEAR_EVENT, message).help(format!("did you mean `{near}({inner}`?")));
-    }
-    let component = event.strip_suffix(FAULTED)?;
-    let created: BTreeSet<&str> = deployment
-        .configurations
-        .iter()
-        .flat_map(|configuration| &configuration.changes)
-        .filter_map(|change| change.kind.makes().map(|(component, ..)| component.as_str()))
-        .collect();
-    (!created.contains(component)).then(|| {
-        Finding::warning(COORD_NEAR_EVENT, format!("`{event}` never comes: there is no component `{component}`"))
-            .help(did_you_mean(component, "components", created.iter().copied()))
-    })
-}
-
-fn heard(
-    deployment: &Deployment,
-    chart: &Chart,
-    (told, waited_for): (&BTreeSet<EventName>, &BTreeSet<EventName>),
-    findings: &mut Findings,
-) {
+fn heard(deployment: &Deployment, chart: &Chart, known: &KnownEvents<'_>, findings: &mut Findings) {
     let answers = answers(deployment, chart);
     let ids: Vec<&str> = deployment.configurations.iter().map(|c| c.id.as_str()).collect();
-    let confirms: BTreeSet<&str> =
-        deployment.configurations.iter().filter_map(|c| c.confirm.map(|c| c.event)).map(|e| e.as_str()).collect();
-    let mut known = confirms.clone();
-    known.extend([deployment.deploy.event.as_str(), deployment.shutdown.event.as_str()]);
-    known.extend(deployment.reactions.iter().map(|reaction| reaction.raise.as_str()));
-    known.extend(deployment.monitors.iter().flat_map(Monitor::events).map(|e| e.as_str()));
-    let accepted: BTreeSet<&str> = deployment.interface.accepts.iter().map(|(event, _)| event.as_str()).collect();
-    // Of what nobody hears it is said where it is raised, with what may have been meant.
-    let told_there = |name: &str| !confirms.contains(name) && !waited_for.iter().any(|event| event.as_str() == name);
-    // Another number is another thing, and no slip.
-    let letters = |name: &str| name.replace(|c: char| c.is_ascii_digit(), "");
-    let declared: BTreeSet<EventName> =
-        deployment.safety.iter().chain(&deployment.emits).map(|(event, _)| *event).collect();
     let mut said: BTreeSet<EventName> = BTreeSet::new();
     for edge in edges(chart) {
         for trigger in chart.triggers(edge).unwrap_or(&[]) {
             let text = chart.event_text(*trigger);
             let Ok(event) = EventName::new(&text) else { continue };
-            let raised = known.contains(text.as_str()) || accepted.contains(text.as_str());
-            if is_internal(&text) || answers.contains(&event) || raised || !said.insert(event) {
+            if is_internal(&text) || answers.contains(&event) || known.is_known(&text) || !said.insert(event) {
                 continue;
             }
             let at = chart.edge_origin(edge);
-            if let Some(finding) = never_raised(deployment, &text) {
-                findings.push(finding.at(at));
+            if let Some(finding) = known.never_raised(&text) {
+                findings.push(finding.at(at).labelled("waits for it"));
                 continue;
             }
             if !deployment.looks_like_answer(&text) {
-                // In a short name two letters make another word; and nobody slips twice in the same way.
-                let slips = if text.chars().count() < 8 { 1 } else { 2 };
-                if !declared.contains(&event)
-                    && !told.contains(&event)
-                    && listed(chart, *trigger) < 2
-                    && let Some(near) = nearest(&text, known.union(&accepted).copied())
-                    && strsim::damerau_levenshtein(&text, near) <= slips
-                    && letters(&text) != letters(near)
-                    && !told_there(near)
-                {
-                    findings.push(
-                        Finding::warning(
-                            COORD_NEAR_EVENT,
-                            format!(
-                                "`{event}` is nearly `{near}`, which the deployment {}",
-                                if known.contains(near) { "raises" } else { "accepts" }
-                            ),
-                        )
-                        .at(at)
-                        .help(format!(
-                            "did you mean `{near}`? if not, a component or an operator must raise `{event}`"
-                        )),
-                    );
-                }
+                let near = known.near(event, listed(chart, *trigger));
+                findings.extend(near.map(|finding| finding.at(at).labelled("waits for it")));
                 continue;
             }
             let (id, suffix) = Verdict::split(&text).unwrap_or_else(|| text.rsplit_once('.').unwrap_or((&text, "")));

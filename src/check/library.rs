@@ -144,6 +144,10 @@ impl Compared<'_> {
         let names = |list: &Vec<TypeName>| words(list.iter());
         found.add("start_after", (&declared.start_after, &library.start_after), false, names);
         found.add("stop_before", (&declared.stop_before, &library.stop_before), false, names);
+        // What the library does not raise is waited for in vain; what is not declared is missed by nobody.
+        if declared.raises.keys().any(|event| !library.raises.contains_key(event)) {
+            found.add("raises", (&declared.raises, &library.raises), false, |all| words(all.keys()));
+        }
         found.add("actuator", (&declared.actuator, &library.actuator), false, bool::to_string);
         found.add("moves", (&declared.moves, &library.moves), false, |moves| {
             words([("start", moves.start), ("stop", moves.stop)].iter().filter(|(_, is)| *is).map(|(word, _)| *word))

@@ -92,6 +92,7 @@ mod shown;
 mod shows;
 mod side_by_side;
 mod simulated;
+mod slips;
 mod standings;
 mod stands;
 mod state;

@@ -14,8 +14,8 @@ use super::state::Failed;
 use super::verdict::CheckVerdict;
 use super::{
     alone, composed, configurations as single, coordinator, coupling, declared, interface, lets_go, library,
-    monitors as watched, paths, purity, safety, settings, simulated, types, undriven, unhandled, universe, unwatched,
-    ways,
+    monitors as watched, paths, purity, safety, settings, simulated, slips, types, undriven, unhandled, universe,
+    unwatched, ways,
 };
 use crate::model::codes::{CLASH, POST_ON_DESTROYED, PRE_ON_CREATED, TOUCHES_DESTROYED};
 use crate::model::{
@@ -97,7 +97,8 @@ fn run_one(
             .collect();
         let waited_for: BTreeSet<EventName> = charts.iter().flat_map(|chart| chart.events()).copied().collect();
         for (view, chart) in views.iter().zip(&charts) {
-            findings.extend(coordinator::check(view, chart, &told, &waited_for));
+            let known = slips::KnownEvents::new(view, &universe, &told, &waited_for);
+            findings.extend(coordinator::check(view, chart, &known));
             findings.extend(unhandled::check(view, chart));
             findings.extend(purity::check(view));
         }

@@ -199,6 +199,11 @@ fn one(out: &Output, ty: &ComponentType) {
     }
     section(out, "operations", &table);
     let mut table = Table::new(2);
+    for (event, doc) in &ty.raises {
+        table.row([out.paint(Style::Name, event), doc.clone()]);
+    }
+    section(out, "events", &table);
+    let mut table = Table::new(2);
     for [call, doc] in injections(ty) {
         table.row([out.paint(Style::Name, call), doc]);
     }

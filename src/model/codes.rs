@@ -532,10 +532,10 @@ codes! {
     COORD_NEVER_EMITTED = "coord::never_emitted", "an event that the deployment emits is raised nowhere",
         "`emits` lists the events that leave the deployment. The coordinator raises this one nowhere, so whoever waits for \
          it outside waits in vain. Raise it in the coordinator, or remove it from the list.";
-    COORD_NEAR_EVENT = "coord::near_event", "an event is nearly, but not quite, one that the deployment raises or accepts",
+    COORD_NEAR_EVENT = "coord::near_event", "an event is nearly, but not quite, one that there is",
         "Events are plain names, and components and operators may raise any, so an unknown one is no error by itself. This \
-         one differs by a letter or two from an event that the deployment raises or accepts, and is probably a slip. Correct it, or \
-         give it a name that cannot be mistaken.";
+         one differs by a letter or two from an event that the deployment raises or accepts, or that a component raises by what its type says (`raises`), \
+         and is probably a slip. Correct it, give it a name that cannot be mistaken, or list it under `accepts`: an operator raises it.";
     COORD_FAILURE_UNHANDLED = "coord::failure_unhandled", "nobody hears that a request failed",
         "Every request can fail. The coordinator asks for a configuration in a state where no transition waits for \
          `ID.failed` (or `ID.broken`), so after a failure it stays where it is as if nothing had happened. Add a transition \

@@ -3,7 +3,7 @@
 use super::finding::Origin;
 use super::injection::InjectionType;
 use super::monitor::{Condition, SELF, is_monitors};
-use super::names::{ComponentName, Ident, TypeName};
+use super::names::{ComponentName, EventName, Ident, TypeName};
 use super::resource::Resource;
 use super::run_state::RunState;
 use super::value::{FitError, Value, ValueType};
@@ -26,6 +26,9 @@ pub struct ComponentType {
     pub properties: BTreeMap<Ident, PropertyType>,
     /// Operations.
     pub operations: BTreeMap<Ident, OperationType>,
+    /// Events that components of it may raise by themselves, each with what it tells.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub raises: BTreeMap<EventName, String>,
     /// What can be made to go wrong in it, beside what can in every component.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub injections: BTreeMap<Ident, InjectionType>,
@@ -382,6 +385,7 @@ impl ComponentType {
             ports: BTreeMap::new(),
             properties: BTreeMap::new(),
             operations: BTreeMap::new(),
+            raises: BTreeMap::new(),
             injections: BTreeMap::new(),
             start_after: Vec::new(),
             stop_before: Vec::new(),

@@ -357,12 +357,21 @@ impl<C: Component> Builder<C> {
         }
     }
 
-    /// An event's name, to be raised later.
+    /// An event that a component of the type may raise, on an [`event_output`](Self::event_output). What [`doc`](Self::doc) says before is
+    /// what the event tells. `davit types` shows it, and `davit check` knows by it what a coordinator was meant to wait for.
     ///
     /// # Panics
     /// When `name` is no event name.
-    pub fn event(&self, name: &str) -> EventName {
-        EventName::new(name).expect("an event's name")
+    pub fn event(&mut self, name: &str) -> EventName {
+        let event = EventName::new(name).expect("an event's name");
+        if let BuilderMode::Describe(d) = &mut self.mode {
+            let (told, doc) = (d.ty.raises.entry(event).or_default(), std::mem::take(&mut d.words).doc);
+            // In two places of the code it is one event all the same.
+            if !doc.is_empty() {
+                *told = doc;
+            }
+        }
+        event
     }
 }
 

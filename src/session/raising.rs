@@ -59,10 +59,8 @@ impl Session {
     /// The coordinators to which an event from outside is given: those of the file whose event it is, and of one of safety those of the
     /// subsystems that it is given on to.
     pub fn given_to(&self, event: EventName) -> Vec<Ident> {
-        let Some(subsystems) = self.junction().subsystems() else { return self.coordinators() };
-        let all = std::iter::once(&event).chain(subsystems.given_on(event));
-        let paths: Vec<Option<Ident>> = all.map(|event| subsystems.path_of(*event)).collect();
-        self.parts().iter().filter(|part| paths.contains(&part.of)).map(|part| part.name).collect()
+        let files: Vec<Option<Ident>> = self.junction().reaches(event).map(|(_, file)| file).collect();
+        self.parts().iter().filter(|part| files.contains(&part.of)).map(|part| part.name).collect()
     }
 
     /// The same as [`raise`](Self::raise); the hub (`was_heard`) says with the number that this answers what became of it, until it is
@@ -113,16 +111,14 @@ impl Session {
         if self.hub().is_stopping() && self.junction().begins(event) {
             return Err(NotRaised::Stopping);
         }
-        let subsystems = self.junction().subsystems();
-        let path = subsystems.and_then(|subsystems| subsystems.path_of(event));
-        let given = |path: Option<Ident>| {
-            let is_of = move |part: &CoordinatorPart| subsystems.is_none() || part.of == path;
-            self.parts().iter().filter(move |part| is_of(part)).filter(|part| to(part.name))
-        };
+        let given =
+            |file: Option<Ident>| self.parts().iter().filter(move |part| part.of == file).filter(|part| to(part.name));
+        let mut reached = self.junction().reaches(event);
+        let own = reached.by_ref().take(1).flat_map(|(_, file)| given(file));
         let incoming = self.junction().incoming(Class::Outside, event).watched(ticket);
         // All of them have room, or none hears of it.
         let (mut held, mut gone): (Vec<&CoordinatorPart>, bool) = (Vec::with_capacity(self.parts().len()), false);
-        for part in given(path) {
+        for part in own {
             match part.coordinator.hold(incoming.class) {
                 Ok(()) => held.push(part),
                 Err(NotAccepted::Full) if part.may_hear(event) => {
@@ -138,10 +134,8 @@ impl Session {
         self.junction().tell_leaving(self.configurator(), event);
         let acted = make_safe(self.hub(), self.configurator(), event, Class::Outside);
         // One of safety is given on to every subsystem that has it: whether it was heard is said there as well.
-        let coordinators = |path| given(path).map(|part| part.coordinator.clone()).collect();
-        let inside: Vec<(EventName, Handles)> = subsystems.map_or(Vec::new(), |subsystems| {
-            subsystems.given_on(event).iter().map(|event| (*event, coordinators(subsystems.path_of(*event)))).collect()
-        });
+        let coordinators = |file| given(file).map(|part| part.coordinator.clone()).collect();
+        let inside: Vec<(EventName, Handles)> = reached.map(|(event, file)| (event, coordinators(file))).collect();
         let given_on: usize = inside.iter().map(|(_, coordinators)| coordinators.len()).sum();
         (held.len() + given_on..self.parts().len()).for_each(|_| self.hub().taken_up(ticket, false));
         let (mut unwatched, mut missed) = (false, 0);

@@ -86,12 +86,19 @@ impl Junction {
         self.give(hub, self.in_file(path), incoming);
     }
 
-    /// Gives an event to whom it is for; one of safety to the subsystems too.
+    /// An event with the subsystem whose it is (none: the deployment's own), and behind it, of one of safety, those of the subsystems that it
+    /// is given on to.
+    pub fn reaches(&self, event: EventName) -> impl Iterator<Item = (EventName, Option<Ident>)> + '_ {
+        let subsystems = self.subsystems();
+        let given_on = subsystems.map_or(&[][..], |subsystems| subsystems.given_on(event));
+        let all = std::iter::once(event).chain(given_on.iter().copied());
+        all.map(move |event| (event, subsystems.and_then(|subsystems| subsystems.path_of(event))))
+    }
+
+    /// Gives an event to whom it is for.
     fn give_all(&self, hub: &Hub, class: Class, event: EventName) {
-        let path = |event| self.subsystems().and_then(|subsystems| subsystems.path_of(event));
-        let also = self.subsystems().map_or(&[][..], |subsystems| subsystems.given_on(event));
-        for event in std::iter::once(&event).chain(also) {
-            self.give_to(hub, path(*event), self.incoming(class, *event));
+        for (event, path) in self.reaches(event) {
+            self.give_to(hub, path, self.incoming(class, event));
         }
     }
 

@@ -117,6 +117,29 @@ fn a_near_event_is_a_slip_where_it_is_near_enough_and_nobody_declares_it() {
 }
 
 #[test]
+fn a_slip_in_what_a_component_raises_is_told_by_its_type() {
+    let told = |events: &[&str]| {
+        let states = ["up", "stuck"];
+        let hears: String = (events.iter().zip(states))
+            .map(|(event, state)| {
+                format!("trans {{ src = \"{state}\", tgt = \"leaving\", events = {{ \"{event}\" }} }},")
+            })
+            .collect();
+        let small = Small::new(CONFIGURATIONS, &format!("{STATES}{hears}"), "");
+        small.demo.replace("small.yaml", "    operations:", "    raises: [e_arrived, e_axis2_fell]\n    operations:");
+        let said = small.check();
+        texts(&said, "coord::near_event").iter().map(|(message, help)| format!("{message}; {help}")).collect::<Vec<_>>()
+    };
+    let slip = "`e_arived` is nearly `e_arrived`, which a component raises; did you mean `e_arrived`? if not, a component or an \
+                operator must raise `e_arived`";
+    assert_eq!(told(&["e_arived"]), [slip]);
+    assert_eq!(told(&["e_arrived", "e_arived"]), [slip], "where it is waited for elsewhere, too");
+    assert!(told(&["e_arrived"]).is_empty());
+    assert_eq!(told(&["e_axi2s_fell"]).len(), 1, "a number in another place is a slip");
+    assert!(told(&["e_axis1_fell"]).is_empty() && told(&["e_axis12_fell"]).is_empty(), "another number is none");
+}
+
+#[test]
 fn a_safety_event_that_nobody_waits_for_is_told_without_an_actuator_and_an_answer_is_refused() {
     let stops = "trans { src = \"up\", tgt = \"leaving\", events = { \"e_estop\" } },";
     let slip = check(stops, "safety: [e_estp]\n");

@@ -256,6 +256,22 @@ fn what_another_coordinator_tells_is_no_slip() {
     assert_eq!((of("'e_arm_off'"), of("")), (0, 1));
 }
 
+#[test]
+fn a_slip_in_what_another_coordinator_tells_is_one() {
+    let tells =
+        by_base("up", "leaving", "trans { src = 'up', tgt = 'up', events = { 'e_a' }, effect = { 'e_arm_made' } },");
+    let of = |event: &str| {
+        let hears = format!(
+            "idle = state {{}}, up = state {{}}, away = state {{}}, trans {{ src = 'initial', tgt = 'idle' }},
+            trans {{ src = 'idle', tgt = 'up', events = {{ 'e_start' }} }}, trans {{ src = 'up', tgt = 'idle', events = {{ 'e_shutdown' }} }},
+            trans {{ src = 'up', tgt = 'away', events = {{ 'e_arm_made' }} }}, trans {{ src = 'away', tgt = 'up', events = {{ '{event}' }} }},
+            trans {{ src = 'away', tgt = 'idle', events = {{ 'e_shutdown' }} }},"
+        );
+        Small::several(BASE, &[("one", &tells), ("two", &hears)], "").check().of("coord::near_event").len()
+    };
+    assert_eq!((of("e_arm_maed"), of("e_arm_made"), of("e_back")), (1, 0, 0));
+}
+
 /// Whoever hears what another one's component reports is followed with it.
 #[test]
 fn who_hears_what_anothers_component_reports_is_followed_with_it() {

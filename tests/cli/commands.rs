@@ -308,6 +308,11 @@ fn types_are_listed_and_shown() {
         at_home(&["types", "standard.Gain"]).out,
         "its library need not be said"
     );
+    let world = at_home(&["types", "World"]).out;
+    assert!(world.contains("events\n") && world.contains("e_robot2_fell"), "{world}");
+    let driver = at_home(&["types", "Driver", "--json"]).json();
+    assert_eq!(driver["raises"]["e_OVERTEMP"], "A motor is too hot; the drives hold.");
+    assert_eq!(driver["raises"]["e_EMERGENCY_STOP"], "Somebody pressed the emergency stop; the drives hold.");
     assert!(at_home(&["types", "Gian"]).err.contains("did you mean `standard.Gain`?"));
     let wrong = demo.run(&["types", "deployment.yaml", "Sorce", "--json"]);
     assert_eq!(wrong.code, 1);

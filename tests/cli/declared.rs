@@ -319,6 +319,13 @@ fn a_declaration_is_held_against_the_library_that_has_the_type() {
             "`standard.Gain`: start_after is declared as standard.Sine, the library has none",
             6,
         ),
+        (
+            "    ports:",
+            "    raises: [e_loud]\n    ports:",
+            "warning",
+            "`standard.Gain`: raises is declared as e_loud, the library has none",
+            6,
+        ),
     ] {
         let found = differences("embedded", from, to);
         let wanted = (severity.to_owned(), message.to_owned(), line);

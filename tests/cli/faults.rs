@@ -224,6 +224,10 @@ fn a_component_fails_by_itself_and_what_cannot_fail_is_told() {
         ("deploy('deployment.yaml', {replay = true}) fail('source')", "`source` is not there now"),
         ("deploy('deployment.yaml') raise('e_fast', { to = 'dem' })", "did you mean `demo`?"),
         ("deploy('deployment.yaml') raise('e_fast', { to = { 1 } })", "`to` is a name or a list of names"),
+        (
+            "deploy('deployment.yaml') raise('e_fast', { to = { a = 'demo' } })",
+            "this table has keys: write `to = { \"NAME\" }`",
+        ),
         ("deploy('deployment.yaml') raise('e_fast', { too = 'demo' })", "did you mean `to`?"),
     ] {
         let demo = Demo::new();

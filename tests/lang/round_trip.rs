@@ -397,18 +397,20 @@ fn component_type() -> impl Strategy<Value = ComponentType> {
         });
     let members =
         (btree_map(ident(), port, 0..3), btree_map(ident(), property, 0..3), btree_map(ident(), operation, 0..3));
-    let others = (vec(type_name(), 0..2), vec(type_name(), 0..2), any::<[bool; 6]>());
+    let raises = btree_map(event(), Just(String::new()), 0..3);
+    let others = (raises, vec(type_name(), 0..2), vec(type_name(), 0..2), any::<[bool; 6]>());
     (type_name(), any_text(), members, others).prop_map(
         |(
             name,
             doc,
             (ports, properties, operations),
-            (start_after, stop_before, [actuator, configure, stop, destroy, starting, stopping]),
+            (raises, start_after, stop_before, [actuator, configure, stop, destroy, starting, stopping]),
         )| ComponentType {
             doc,
             ports,
             properties,
             operations,
+            raises,
             start_after,
             stop_before,
             actuator,

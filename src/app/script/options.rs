@@ -80,9 +80,10 @@ impl OptionFields {
         match self.given.get(name) {
             None => Ok(None),
             // What has a name of its own in there would be passed over.
-            Some(keyed @ Value::Table(list)) if list.pairs::<Value, Value>().count() != list.raw_len() => {
-                Err(wrong(keyed))
-            }
+            Some(Value::Table(list)) if list.pairs::<Value, Value>().count() != list.raw_len() => Err(error(format!(
+                "`{}`: `{name}` is a name or a list of names, and this table has keys: write `{name} = {{ \"NAME\" }}`",
+                self.function
+            ))),
             Some(Value::Table(list)) => {
                 list.sequence_values::<Value>().map(|value| text(&value?)).collect::<mlua::Result<_>>().map(Some)
             }

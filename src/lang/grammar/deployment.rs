@@ -8,7 +8,7 @@ use crate::model::codes::{
 };
 
 const FILES: Form = Form::Several(&Form::Path);
-const EVENTS: Form = Form::Several(&Form::Name(NameKind::Event));
+pub(super) const EVENTS: Form = Form::Several(&Form::Name(NameKind::Event));
 
 /// Fewest frames a deployment may ask for: the newest, and the one that all others are squashed into.
 const FEWEST_FRAMES: i64 = 2;

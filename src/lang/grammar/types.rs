@@ -1,5 +1,6 @@
 //! Component types that a deployment declares.
 
+use super::deployment::EVENTS;
 use super::{Form, Key, NameKind, Object, key};
 use crate::model::codes::{
     MONITOR_UNKNOWN_WORD, TEXT_BAD_NAME, TEXT_BAD_VALUE, TEXT_WRONG_TYPE, TYPE_BAD_DEFAULT, TYPE_BAD_TYPE,
@@ -50,6 +51,13 @@ pub static TYPE: Object = Object {
             "operations: { reset: { effect: none } }",
             ("operations: [reset]", TEXT_WRONG_TYPE),
         ).without("none"),
+        key(
+            "raises",
+            EVENTS,
+            "Events that components of it may raise by themselves: `davit check` knows by them what a coordinator was meant to wait for.",
+            "raises: [e_arrived]",
+            ("raises: [\"e arrived\"]", TEXT_BAD_NAME),
+        ).without("none is known"),
         key(
             "start_after",
             Form::Several(&Form::Name(NameKind::Type)),

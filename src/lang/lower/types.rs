@@ -4,8 +4,8 @@ use super::{by_name, choice, condition, entries, name, own_name, text, value};
 use crate::lang::grammar::{EFFECT, OPERATION, PORT, PROPERTY, TYPE};
 use crate::lang::tree::{Cx, Entry, Fields, Kind, Node};
 use crate::model::{
-    ComponentType, Direction, Effect, Finding, Ident, OperationType, PortType, PropertyType, Resource, Tunable,
-    TypeName, ValueType, codes,
+    ComponentType, Direction, Effect, EventName, Finding, Ident, OperationType, PortType, PropertyType, Resource,
+    Tunable, TypeName, ValueType, codes,
 };
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -25,6 +25,8 @@ fn component_type(cx: &mut Cx, entry: Entry) -> Option<ComponentType> {
     ty.ports = members(cx, &mut fields, "ports", "u: { direction: in, type: float }", port);
     ty.properties = members(cx, &mut fields, "properties", "k: { type: float, default: 1.0 }", property);
     ty.operations = members(cx, &mut fields, "operations", "reset: { effect: none }", operation);
+    let raised: Vec<EventName> = fields.names(cx, "raises");
+    ty.raises = raised.into_iter().map(|event| (event, String::new())).collect();
     ty.start_after = fields.names(cx, "start_after");
     ty.stop_before = fields.names(cx, "stop_before");
     ty.actuator = fields.truth(cx, "actuator").unwrap_or_default();

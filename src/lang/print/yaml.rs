@@ -226,6 +226,9 @@ fn component_type(out: &mut String, ty: &ComponentType) {
         let (settled, doc) = (settled.unwrap_or_default(), doc(&operation.doc));
         _ = writeln!(body, "      {}: {{ args: {args}{returns}, effect: {effect}{moves}{settled}{doc} }}", t(name));
     }
+    if !ty.raises.is_empty() {
+        _ = writeln!(body, "    raises: {}", list(ty.raises.keys().map(|event| t(event))));
+    }
     for (name, types) in [("start_after", &ty.start_after), ("stop_before", &ty.stop_before)] {
         if !types.is_empty() {
             _ = writeln!(body, "    {name}: {}", list(types.iter().map(|ty| t(ty))));

@@ -179,11 +179,10 @@ impl Component for YoubotWorld {
             bar_mass: b.doc("Of the bar.").unit("kg").range(0.2..=100.0).property("bar_mass", 1.0),
             bar_damping: b.doc("Of the bar's rails.").unit("N s/m").range(0.0..=500.0).property("bar_damping", 2.0),
             bar_position: b.doc("Where the bar is; written while there is one.").unit("m").output("bar_position"),
-            events: b
-                .doc("e_arm_fell: an arm whose windings are shorted came down by more than 2 cm. And which: e_robot1_fell, e_robot2_fell.")
-                .event_output("events"),
-            fell: b.event("e_arm_fell"),
-            fell_of: [b.event("e_robot1_fell"), b.event("e_robot2_fell")],
+            events: b.doc("That an arm came down.").event_output("events"),
+            fell: b.doc("An arm whose windings are shorted came down by more than 2 cm.").event("e_arm_fell"),
+            fell_of: ["robot1", "robot2"]
+                .map(|robot| b.doc(&format!("The arm of {robot} did.")).event(&format!("e_{robot}_fell"))),
             stiffness: b
                 .doc("Of table, wall and bar.")
                 .unit("N/m")

@@ -15,7 +15,7 @@ pub(super) struct DriveFault {
     /// Whether it is one motor's, and no matter of all drives.
     of_a_motor: bool,
     /// What it is, for `davit types`.
-    what: &'static str,
+    pub(super) what: &'static str,
 }
 
 const fn fault(name: &'static str, event: &'static str, flag: i64, of_a_motor: bool, what: &'static str) -> DriveFault {

@@ -1,0 +1,112 @@
+//! Events that are nearly, but not quite, ones that there are: an unknown one is no error by itself, since operators may raise any.
+
+use super::universe::Universe;
+use crate::model::codes::COORD_NEAR_EVENT;
+use crate::model::finding::{closest, did_you_mean, nearest};
+use crate::model::{Deployment, EventName, FAULTED, Finding, Monitor, Raise};
+use std::collections::BTreeSet;
+
+/// What is known of events of a deployment.
+pub struct KnownEvents<'a> {
+    deployment: &'a Deployment,
+    /// What is raised in it, as its files say.
+    raised: BTreeSet<&'a str>,
+    /// What its components raise, as their types say.
+    by_components: BTreeSet<&'a str>,
+    accepted: BTreeSet<&'a str>,
+    declared: BTreeSet<EventName>,
+    confirms: BTreeSet<&'a str>,
+    /// What coordinators raise.
+    told: &'a BTreeSet<EventName>,
+    /// What transitions of any of them list.
+    waited_for: &'a BTreeSet<EventName>,
+}
+
+impl<'a> KnownEvents<'a> {
+    /// `told`: what coordinators raise; `waited_for`: what transitions of any of them list.
+    pub fn new(
+        deployment: &'a Deployment,
+        universe: &'a Universe,
+        told: &'a BTreeSet<EventName>,
+        waited_for: &'a BTreeSet<EventName>,
+    ) -> Self {
+        let configurations = || deployment.configurations.iter();
+        let confirms: BTreeSet<&str> =
+            configurations().filter_map(|c| c.confirm.map(|c| c.event)).map(|event| event.as_str()).collect();
+        let mut raised = confirms.clone();
+        raised.extend([deployment.deploy.event.as_str(), deployment.shutdown.event.as_str()]);
+        raised.extend(deployment.reactions.iter().map(|reaction| reaction.raise.as_str()));
+        raised.extend(deployment.monitors.iter().flat_map(Monitor::events).map(|event| event.as_str()));
+        let is_event = |name: &EventName| {
+            matches!(Raise::of(*name, |id| deployment.configuration(id).is_some()), Raise::Event)
+                && !name.as_str().contains('/')
+        };
+        raised.extend(told.iter().filter(|name| is_event(name)).map(|event| event.as_str()));
+        // What components of a subsystem raise is heard there.
+        let own = universe.components().filter(|component| !component.as_str().contains('/'));
+        let types = own.flat_map(|component| universe.of(component)).filter_map(|made| made.description.as_deref());
+        let by_components = types.flat_map(|ty| ty.raises.keys()).map(|event| event.as_str()).collect();
+        let accepted = deployment.interface.accepts.iter().map(|(event, _)| event.as_str()).collect();
+        let declared = deployment.safety.iter().chain(&deployment.emits).map(|(event, _)| *event).collect();
+        Self { deployment, raised, by_components, accepted, declared, confirms, told, waited_for }
+    }
+
+    /// Whether it is one that there is.
+    pub fn is_known(&self, event: &str) -> bool {
+        [&self.raised, &self.by_components, &self.accepted].into_iter().any(|known| known.contains(event))
+    }
+
+    /// That nobody raises an event, since it was meant to be another one: a time event, or the fault of a component.
+    pub fn never_raised(&self, event: &str) -> Option<Finding> {
+        if let Some((head, inner)) = event.split_once('(') {
+            let near = closest(head, ["e_after", "e_at"]);
+            let message = format!("`{event}` is no time event: somebody must raise it under that very name");
+            return Some(Finding::warning(COORD_NEAR_EVENT, message).help(format!("did you mean `{near}({inner}`?")));
+        }
+        let component = event.strip_suffix(FAULTED)?;
+        let changes = self.deployment.configurations.iter().flat_map(|configuration| &configuration.changes);
+        let created: BTreeSet<&str> =
+            changes.filter_map(|change| change.kind.makes()).map(|(component, ..)| component.as_str()).collect();
+        (!created.contains(component)).then(|| {
+            Finding::warning(COORD_NEAR_EVENT, format!("`{event}` never comes: there is no component `{component}`"))
+                .help(did_you_mean(component, "components", created.iter().copied()))
+        })
+    }
+
+    /// That an event which `listed` transitions of a coordinator wait for is nearly one that there is.
+    pub fn near(&self, event: EventName, listed: usize) -> Option<Finding> {
+        let text = event.as_str();
+        // Nobody slips twice in the same way.
+        if self.declared.contains(&event) || self.told.contains(&event) || listed > 1 {
+            return None;
+        }
+        let known = [&self.raised, &self.by_components, &self.accepted].into_iter().flatten();
+        let near = nearest(text, known.copied())?;
+        // Of what nobody hears it is said where it is raised, with what may have been meant; but a component's type is another file's.
+        let is_heard = self.waited_for.iter().any(|event| event.as_str() == near);
+        if !is_heard && !self.confirms.contains(near) && !self.by_components.contains(near) {
+            return None;
+        }
+        // In a short name two letters make another word; and another number is another thing.
+        let slips = if text.chars().count() < 8 { 1 } else { 2 };
+        if strsim::damerau_levenshtein(text, near) > slips || without_numbers(text) == without_numbers(near) {
+            return None;
+        }
+        let by = match (self.raised.contains(near), self.by_components.contains(near)) {
+            (true, _) => "the deployment raises",
+            (false, true) => "a component raises",
+            (false, false) => "the deployment accepts",
+        };
+        let finding = Finding::warning(COORD_NEAR_EVENT, format!("`{event}` is nearly `{near}`, which {by}"));
+        Some(finding.help(format!("did you mean `{near}`? if not, a component or an operator must raise `{event}`")))
+    }
+}
+
+/// A name with the same in place of every number.
+fn without_numbers(name: &str) -> String {
+    let mut text = name.replace(|c: char| c.is_ascii_digit(), "0");
+    while text.contains("00") {
+        text = text.replace("00", "0");
+    }
+    text
+}
