@@ -1,73 +1,7 @@
 //! Finding tokens in a text: how far a Lua call reaches, and where a word stands in it.
 
+use super::tokens::{LuaToken, next_token};
 use std::ops::Range;
-
-/// A token of Lua, as far as places need it.
-#[derive(Debug, Clone, PartialEq, Eq)]
-enum ExtentToken {
-    Name,
-    /// A string with the range of its content.
-    Text(Range<usize>),
-    Open,
-    Close,
-    Other,
-}
-
-/// Length of a long bracket's opening (`[[`, `[==[`) at `at`, with its level.
-fn long_bracket(text: &[u8], at: usize) -> Option<(usize, usize)> {
-    let level = text.get(at + 1..)?.iter().take_while(|b| **b == b'=').count();
-    (text.get(at) == Some(&b'[') && text.get(at + 1 + level) == Some(&b'[')).then_some((level + 2, level))
-}
-
-/// The end of the content of a long bracket, and the end of the bracket.
-fn long_end(text: &[u8], from: usize, level: usize) -> (usize, usize) {
-    let mut i = from;
-    while i < text.len() {
-        let closes = text[i] == b']'
-            && text[i + 1..].iter().take(level).filter(|b| **b == b'=').count() == level
-            && text.get(i + 1 + level) == Some(&b']');
-        if closes {
-            return (i, i + level + 2);
-        }
-        i += 1;
-    }
-    (text.len(), text.len())
-}
-
-/// The next token at or after `at`, with its bytes; none at the end. Comments are skipped.
-fn next_token(text: &[u8], mut at: usize) -> Option<(Range<usize>, ExtentToken)> {
-    loop {
-        let byte = *text.get(at)?;
-        if byte.is_ascii_whitespace() {
-            at += 1;
-        } else if text[at..].starts_with(b"--") {
-            at = match long_bracket(text, at + 2) {
-                Some((length, level)) => long_end(text, at + 2 + length, level).1,
-                None => text[at..].iter().position(|b| *b == b'\n').map_or(text.len(), |n| at + n),
-            };
-        } else if byte.is_ascii_alphabetic() || byte == b'_' {
-            let length = text[at..].iter().take_while(|b| b.is_ascii_alphanumeric() || **b == b'_').count();
-            return Some((at..at + length, ExtentToken::Name));
-        } else if byte == b'"' || byte == b'\'' {
-            let mut end = at + 1;
-            while end < text.len() && text[end] != byte && text[end] != b'\n' {
-                end += if text[end] == b'\\' { 2 } else { 1 };
-            }
-            let end = end.min(text.len());
-            return Some((at..(end + 1).min(text.len()), ExtentToken::Text(at + 1..end)));
-        } else if let Some((length, level)) = long_bracket(text, at) {
-            let (content, end) = long_end(text, at + length, level);
-            return Some((at..end, ExtentToken::Text(at + length..content)));
-        } else {
-            let token = match byte {
-                b'(' | b'{' | b'[' => ExtentToken::Open,
-                b')' | b'}' | b']' => ExtentToken::Close,
-                _ => ExtentToken::Other,
-            };
-            return Some((at..at + 1, token));
-        }
-    }
-}
 
 /// From the start of `span` (a name that is called) to the bracket that closes the call, with `:undo(…)` after it.
 pub fn balanced(text: &str, span: Range<usize>) -> Range<usize> {
@@ -75,16 +9,16 @@ pub fn balanced(text: &str, span: Range<usize>) -> Range<usize> {
     let (mut at, mut depth, mut end) = (span.end, 0_usize, span.end);
     while let Some((token, kind)) = next_token(bytes, at) {
         match kind {
-            ExtentToken::Open => depth += 1,
-            ExtentToken::Close if depth <= 1 => {
+            LuaToken::Open => depth += 1,
+            LuaToken::Close if depth <= 1 => {
                 end = token.end;
                 match next_token(bytes, end) {
-                    Some((next, ExtentToken::Other)) if bytes[next.start] == b':' => depth = 0,
+                    Some((next, LuaToken::Other)) if bytes[next.start] == b':' => depth = 0,
                     _ => break,
                 }
             }
-            ExtentToken::Close => depth -= 1,
-            ExtentToken::Other if depth == 0 && !matches!(bytes[token.start], b':' | b'.') => break,
+            LuaToken::Close => depth -= 1,
+            LuaToken::Other if depth == 0 && !matches!(bytes[token.start], b':' | b'.') => break,
             _ => {}
         }
         at = token.end;
@@ -101,7 +35,7 @@ pub fn find_name(text: &str, range: Range<usize>, word: &str, nth: usize) -> Opt
     let mut at = range.start;
     let (mut found, mut count) = (None, 0);
     while let Some((token, kind)) = next_token(bytes, at) {
-        if kind == ExtentToken::Name && &bytes[token.clone()] == word.as_bytes() {
+        if kind == LuaToken::Name && &bytes[token.clone()] == word.as_bytes() {
             found = Some(token.clone());
             if count == nth {
                 break;
@@ -124,8 +58,8 @@ pub fn find(text: &str, range: Range<usize>, word: &str) -> Option<Range<usize>>
     while let Some((token, kind)) = next_token(bytes, at) {
         at = token.end;
         let content = match kind {
-            ExtentToken::Name => token.clone(),
-            ExtentToken::Text(content) => content,
+            LuaToken::Name => token.clone(),
+            LuaToken::Text(content) => content,
             _ => continue,
         };
         if text.get(content.clone()) == Some(word) {
@@ -178,7 +112,7 @@ pub fn find_read(text: &str, line: Range<usize>, word: &str) -> Option<Range<usi
     let mut at = line.start;
     while let Some((token, kind)) = next_token(bytes, at) {
         at = token.end;
-        if kind != ExtentToken::Name || text.get(token.clone()) != Some(word) {
+        if kind != LuaToken::Name || text.get(token.clone()) != Some(word) {
             continue;
         }
         let (before, after) = (text[line.start..token.start].trim_end(), text[token.end..line.end].trim_start());
@@ -205,17 +139,17 @@ pub fn find_in_element(text: &str, line: Range<usize>, word: &str) -> Option<Ran
         at = token.end;
         let inside = open.last().copied().unwrap_or(false);
         match kind {
-            ExtentToken::Open => open.push(inside || (named && !open.is_empty())),
-            ExtentToken::Close => _ = open.pop(),
-            ExtentToken::Name | ExtentToken::Text(_) if !inside => {
-                let content = if let ExtentToken::Text(content) = &kind { content.clone() } else { token.clone() };
+            LuaToken::Open => open.push(inside || (named && !open.is_empty())),
+            LuaToken::Close => _ = open.pop(),
+            LuaToken::Name | LuaToken::Text(_) if !inside => {
+                let content = if let LuaToken::Text(content) = &kind { content.clone() } else { token.clone() };
                 if text.get(content) == Some(word) {
                     return Some(token).filter(|span| text.get(span.clone()).is_some());
                 }
             }
             _ => {}
         }
-        named = kind == ExtentToken::Name;
+        named = kind == LuaToken::Name;
     }
     None
 }
@@ -224,8 +158,8 @@ pub fn find_in_element(text: &str, line: Range<usize>, word: &str) -> Option<Ran
 pub fn reach_of_key(text: &str, key: &Range<usize>, end: usize) -> Range<usize> {
     let bytes = text.as_bytes().get(..end).unwrap_or_default();
     match next_token(bytes, key.end) {
-        Some((equals, ExtentToken::Other)) if bytes[equals.start] == b'=' => match next_token(bytes, equals.end) {
-            Some((open, ExtentToken::Open)) => {
+        Some((equals, LuaToken::Other)) if bytes[equals.start] == b'=' => match next_token(bytes, equals.end) {
+            Some((open, LuaToken::Open)) => {
                 let value = balanced(text, open.start..open.start);
                 value.start..value.end.min(end)
             }

@@ -7,7 +7,9 @@
 mod extent;
 mod render;
 mod source_map;
+mod tokens;
 mod yaml_extent;
 
 pub use render::{RenderOptions, render, render_with, to_json};
 pub use source_map::{FileId, Language, Location, SourceFile, SourceMap};
+pub use tokens::{LuaToken, next_token};

@@ -23,6 +23,7 @@ mod slips;
 mod spelling;
 mod spelling_xml;
 mod texts;
+mod tokens;
 mod tree;
 mod trusted;
 mod whole;

@@ -1,9 +1,11 @@
 //! What is legal in rFSM and was hardly meant: fields whose names are nearly known ones, and globals that nobody has set as the
 //! values of fields.
 
-use super::tree::Cx;
+use super::tokens::{KeyAgain, Token, keys_again, tokens};
+use super::tree::{Cx, KEEP_ONE};
+use crate::diagnostics::FileId;
 use crate::functions::Field;
-use crate::model::{Finding, Origin, codes};
+use crate::model::{Finding, Findings, Origin, codes};
 
 /// The finding of a field that means nothing, if it looks like a slip.
 pub fn field(field: &Field, at: Origin) -> Option<Finding> {
@@ -46,16 +48,16 @@ pub fn unset(cx: &mut Cx, line_at: Origin, text: &str, line: u32, name: &str) ->
 fn is_value(text: &str, line: u32, name: &str) -> bool {
     let tokens = tokens(text);
     let mut open: Vec<&str> = Vec::new();
-    for (i, (token, at)) in tokens.iter().enumerate() {
-        match *token {
-            "{" | "(" | "[" => open.push(token),
+    for (i, token) in tokens.iter().enumerate() {
+        match token.text {
+            "{" | "(" | "[" => open.push(token.text),
             "}" | ")" | "]" => _ = open.pop(),
             _ => {}
         }
-        let next = tokens.get(i + 1).map(|(token, _)| *token);
-        let before = i.checked_sub(1).map(|i| tokens[i].0);
-        if *at == line
-            && *token == name
+        let next = tokens.get(i + 1).map(|token| token.text);
+        let before = i.checked_sub(1).map(|i| tokens[i].text);
+        if token.line == line
+            && token.text == name
             && before == Some("=")
             && matches!(next, Some("," | ";" | "}"))
             && open.last() == Some(&"{")
@@ -66,54 +68,18 @@ fn is_value(text: &str, line: u32, name: &str) -> bool {
     false
 }
 
-/// The words and signs of a Lua text with their lines, without texts and comments.
-fn tokens(text: &str) -> Vec<(&str, u32)> {
-    let bytes = text.as_bytes();
-    let (mut out, mut at, mut line) = (Vec::new(), 0, 1);
-    while at < bytes.len() {
-        let start = at;
-        at += match bytes[at] {
-            b'-' if bytes.get(at + 1) == Some(&b'-') => match long(&text[at + 2..]) {
-                Some(length) => length + 2,
-                None => text[at..].find('\n').unwrap_or(text.len() - at),
-            },
-            b'[' if long(&text[at..]).is_some() => long(&text[at..]).unwrap_or(1),
-            quote @ (b'"' | b'\'') => short(&bytes[at..], quote),
-            b if b.is_ascii_alphanumeric() || b == b'_' => {
-                let word = |b: &&u8| b.is_ascii_alphanumeric() || **b == b'_';
-                let length = bytes[at..].iter().take_while(word).count();
-                out.push((&text[at..at + length], line));
-                length
-            }
-            // `==`, `~=`, `<=` and `>=` are no assignments.
-            b'=' | b'~' | b'<' | b'>' if bytes.get(at + 1) == Some(&b'=') => 2,
-            b if b.is_ascii_punctuation() => {
-                out.push((&text[at..=at], line));
-                1
-            }
-            _ => 1,
-        };
-        at = at.min(bytes.len());
-        line += u32::try_from(bytes[start..at].iter().filter(|b| **b == b'\n').count()).unwrap_or(0);
-    }
-    out
-}
-
-/// The length of a text in long brackets (`[[…]]`, `[=[…]=]`) that begins here.
-fn long(text: &str) -> Option<usize> {
-    let level = text.strip_prefix('[')?.bytes().take_while(|b| *b == b'=').count();
-    text[level + 1..].strip_prefix('[')?;
-    let close = format!("]{}]", "=".repeat(level));
-    Some(text.find(&close).map_or(text.len(), |end| end + close.len()))
-}
-
-/// The length of a quoted text.
-fn short(bytes: &[u8], quote: u8) -> usize {
-    let mut at = 1;
-    while at < bytes.len() && bytes[at] != quote && bytes[at] != b'\n' {
-        at += if bytes[at] == b'\\' { 2 } else { 1 };
-    }
-    (at + 1).min(bytes.len())
+/// That a key stands twice in one table of a text: legal, and hardly meant.
+pub fn twice(cx: &mut Cx, file: FileId, text: &str) -> Findings {
+    let at = |cx: &mut Cx, token: &Token<'_>| cx.sources.exact(file, token.line, token.column, token.length);
+    let again = keys_again(&tokens(text));
+    let finding = |key: &KeyAgain<'_>| {
+        let message = format!("`{}` stands twice in one table: the last one counts", key.key);
+        warning(message, at(cx, &key.again))
+            .labelled("again here")
+            .also(at(cx, &key.first), "first here")
+            .help(KEEP_ONE)
+    };
+    again.iter().map(finding).collect()
 }
 
 #[cfg(test)]

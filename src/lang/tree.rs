@@ -305,6 +305,18 @@ impl Fields {
     }
 }
 
+/// What to do about a key that stands twice.
+pub const KEEP_ONE: &str = "keep one of them, or give one another name";
+
+/// A key stands twice in one table of a text.
+pub fn stands_twice(key: &str, first: Origin, again: Origin) -> Finding {
+    Finding::error(codes::TEXT_DUPLICATE_KEY, format!("`{key}` stands twice in one table"))
+        .at(again)
+        .labelled("again here")
+        .also(first, "first here")
+        .help(KEEP_ONE)
+}
+
 /// A file that is being read: its id and the place of the whole.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Reading {

@@ -49,6 +49,7 @@ const MAY_GO: &[Code] = &[
     codes::LUA_UNDEFINED,
     codes::LUA_ERROR,
     codes::LUA_BAD_RETURN,
+    codes::TEXT_DUPLICATE_KEY,
     codes::TEXT_UNKNOWN_KEY,
     codes::TEXT_WRONG_TYPE,
     codes::TEXT_BAD_NAME,
@@ -197,6 +198,13 @@ fn open(
             finding.help("a pure coordinator has no fields of one's own: keep it in a comment or in `doc`")
         });
         slips::field(field, place).or(left_out).into_iter().for_each(|finding| cx.report(finding));
+    }
+    let mut files: Vec<FileId> = ids.values().copied().collect();
+    files.sort_unstable_by_key(|id| id.0);
+    for id in files {
+        let text: Arc<str> = cx.sources.file(id).text.clone();
+        let found = slips::twice(cx, id, &text);
+        found.into_iter().for_each(|finding| cx.report(finding));
     }
     let mut looked_through = 0;
     for (name, spot) in &reads.unset {

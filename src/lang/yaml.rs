@@ -3,7 +3,7 @@
 //! YAML 1.2: `yes` and `on` are texts, only `true` and `false` are not. One document a file. Aliases are expanded under
 //! a budget of nodes; keys stand once; tags other than the core ones are refused.
 
-use super::tree::{Cx, Entry, Kind, Node, Reading};
+use super::tree::{Cx, Entry, Kind, Node, Reading, stands_twice};
 use crate::limits;
 use crate::model::{Finding, Origin, codes};
 use rustc_hash::FxHashMap;
@@ -222,13 +222,7 @@ impl YamlReader<'_> {
                         }
                     };
                     if let Some(first) = first {
-                        self.cx.report(
-                            Finding::error(codes::TEXT_DUPLICATE_KEY, format!("`{text}` stands twice in one table"))
-                                .at(node.origin)
-                                .labelled("again here")
-                                .also(first, "first here")
-                                .help("keep one of them, or give one another name"),
-                        );
+                        self.cx.report(stands_twice(&text, first, node.origin));
                     }
                     *key = Some((if first.is_some() { AGAIN } else { text }, node.origin));
                 }

@@ -79,7 +79,7 @@ codes! {
          type of a value follows from the place where it stands.";
     TEXT_DUPLICATE_KEY = "text::duplicate_key", "a key stands twice",
         "The same key stands twice in one table, or the same file twice in one list. Which of the two was meant cannot \
-         be known, and silently taking the last one hides mistakes. Keep one of them.";
+         be known, and silently taking the last one, as Lua itself does, hides mistakes. Keep one of them.";
     TEXT_UNKNOWN_KEY = "text::unknown_key", "a key is not known",
         "A table has a key that means nothing at this place. It is refused rather than ignored, since it is nearly \
          always misspelt or stands one level too high or too low. The nearest known key is suggested.";

@@ -2,7 +2,7 @@
 //!
 //! The budgets are counted (instructions, bytes, values, depth); nothing here looks at a clock.
 
-use crate::helpers::{codes, load, shown, with_configurations};
+use crate::helpers::{COORDINATOR, DEPLOYMENT, codes, load, shown, with_configurations};
 use davit::lang::{self, LoadOptions, Sources};
 use std::fmt::Write as _;
 use std::path::Path;
@@ -247,7 +247,25 @@ fn values_are_finite() {
 #[test]
 fn duplicates_are_found() {
     let twice = "ConfiguratorConf { a = Configuration { }, a = Configuration { destroy('A') } }";
-    assert_eq!(codes(&with_configurations(twice)), ["conf::unnamed 1:24"]);
+    let loaded = with_configurations(twice);
+    assert_eq!(codes(&loaded), ["text::duplicate_key 1:43"], "told once, where it stands again");
+    assert!(shown(&loaded.findings, &loaded.sources).contains("first here"));
+    // Of plain values Lua keeps no trace at all: neither of states, nor of lists.
+    for (chart, at) in [
+        (COORDINATOR.replace("fault = state {},", "idle = state { up = state {} }, fault = state {},"), "4:3"),
+        (COORDINATOR.replace("config = \"up\"", "config = \"up\", ['config'] = \"up\""), "3:41"),
+        (COORDINATOR.replace("tgt = \"idle\", events", "tgt = \"idle\", src = \"fault\", events"), "8:46"),
+    ] {
+        let loaded = load(&[("k.lua", &chart)], &LoadOptions::default());
+        let found = codes(&loaded);
+        assert!(found.contains(&format!("text::duplicate_key {at}")), "{chart}: {found:?}");
+    }
+    // Where it is trusted it is run as rFSM runs it, and told.
+    let chart = COORDINATOR.replace("fault = state {},", "fault = state {}, fault = state { entry = function() end },");
+    let trusted = format!("{DEPLOYMENT}trusted: true\n");
+    let loaded = load(&[("k.lua", &chart), ("d.yaml", &trusted)], &LoadOptions::default());
+    assert_eq!(codes(&loaded), ["chart::slip 4:21"], "{}", shown(&loaded.findings, &loaded.sources));
+    assert!(loaded.deployment.is_some());
     let over_files = load(
         &[
             ("c.lua", "ConfiguratorConf { up = Configuration {} }"),

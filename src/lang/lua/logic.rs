@@ -2,6 +2,7 @@
 //! be seen in the text.
 
 use super::recorder::Recorder;
+use crate::lang::tokens::{Token, tokens};
 use crate::lang::words;
 use crate::model::{Finding, codes};
 
@@ -30,8 +31,7 @@ pub fn check(recorder: &mut Recorder, text: &str) {
                 "and" => "gives the condition after it, and the one before it counts for nothing",
                 _ => "gives the condition before it, and the one after it counts for nothing",
             };
-            let length = u32::try_from(token.text.len()).unwrap_or(1);
-            let origin = recorder.cx.sources.exact(recorder.reading.file, token.line, token.column, length);
+            let origin = recorder.cx.sources.exact(recorder.reading.file, token.line, token.column, token.length);
             recorder.cx.report(
                 Finding::error(codes::LUA_LOGIC, format!("Lua's own `{}` {what}", token.text))
                     .at(origin)
@@ -43,68 +43,6 @@ pub fn check(recorder: &mut Recorder, text: &str) {
 
 fn is_condition(word: &str) -> bool {
     words::CONDITIONS.iter().any(|known| known.name == word)
-}
-
-struct Token<'t> {
-    text: &'t str,
-    /// From 1.
-    line: u32,
-    /// In characters, from 0.
-    column: u32,
-}
-
-/// Words and single signs; a text in quotes or brackets is one token, `"`.
-fn tokens(text: &str) -> Vec<Token<'_>> {
-    let mut tokens = Vec::new();
-    let (mut rest, mut line, mut column) = (text, 1, 0);
-    while let Some(first) = rest.chars().next() {
-        let word = |c: char| c.is_alphanumeric() || c == '_';
-        let (length, shown) = if rest.starts_with("--") {
-            (comment(rest), None)
-        } else if first == '"' || first == '\'' {
-            (quoted(rest, first), Some("\""))
-        } else if let Some(length) = bracketed(rest) {
-            (length, Some("\""))
-        } else if word(first) {
-            let length = rest.find(|c| !word(c)).unwrap_or(rest.len());
-            (length, Some(&rest[..length]))
-        } else {
-            let length = first.len_utf8();
-            (length, (!first.is_whitespace()).then_some(&rest[..length]))
-        };
-        tokens.extend(shown.map(|text| Token { text, line, column }));
-        for c in rest[..length].chars() {
-            (line, column) = if c == '\n' { (line + 1, 0) } else { (line, column + 1) };
-        }
-        rest = &rest[length..];
-    }
-    tokens
-}
-
-fn comment(rest: &str) -> usize {
-    bracketed(&rest[2..]).map_or_else(|| rest.find('\n').unwrap_or(rest.len()), |length| length + 2)
-}
-
-fn quoted(rest: &str, quote: char) -> usize {
-    let mut escaped = false;
-    for (at, c) in rest.char_indices().skip(1) {
-        match c {
-            _ if escaped => escaped = false,
-            '\\' => escaped = true,
-            c if c == quote => return at + 1,
-            _ => (),
-        }
-    }
-    rest.len()
-}
-
-/// The length of `[[…]]` or `[=[…]=]` at the beginning.
-fn bracketed(rest: &str) -> Option<usize> {
-    let inner = rest.strip_prefix('[')?;
-    let level = inner.bytes().take_while(|b| *b == b'=').count();
-    inner[level..].strip_prefix('[')?;
-    let end = format!("]{}]", "=".repeat(level));
-    Some(rest.find(&end).map_or(rest.len(), |at| at + end.len()))
 }
 
 /// Names that the text gives to conditions: `x = above(…)`.

@@ -13,7 +13,8 @@ mod sandbox;
 
 use super::files::Sources;
 use super::params::Params;
-use super::tree::{Cx, Entry, Kind, Node, Reading};
+use super::tokens::{KeyAgain, Token, keys_again, tokens};
+use super::tree::{Cx, Entry, Kind, Node, Reading, stands_twice};
 use crate::limits;
 use crate::model::{Finding, codes};
 use mlua::chunk::ChunkMode;
@@ -114,7 +115,19 @@ fn chunk(lua: &mlua::Lua, shared: &SharedRecorder, text: &str, env: mlua::Table)
     let before = std::mem::replace(&mut shared.borrow_mut().parsing, true);
     let function = chunk.into_function()?;
     shared.borrow_mut().parsing = before;
+    twice(&mut shared.borrow_mut(), text);
     Ok(function)
+}
+
+/// Reports keys that stand twice in one table: Lua keeps the last, and what was written first is lost.
+fn twice(recorder: &mut Recorder, text: &str) {
+    let file = recorder.reading.file;
+    for KeyAgain { key, first, again } in keys_again(&tokens(text)) {
+        let mut at = |token: Token<'_>| recorder.cx.sources.exact(file, token.line, token.column, token.length);
+        let (first, again) = (at(first), at(again));
+        recorder.cx.report(stands_twice(key, first, again));
+        recorder.has_lost = true;
+    }
 }
 
 impl Recorder {
@@ -187,21 +200,23 @@ impl Recorder {
                 entries.push(Entry { key: stem.to_owned().into(), origin: value.origin, value });
                 continue;
             }
-            if self.has_undefined() {
+            if self.has_lost() {
                 continue;
             }
             let finding =
                 Finding::error(codes::CONF_UNNAMED, "this configuration has no name, so nothing can ask for it");
-            self.cx.report(finding.at(value.origin).labelled("made, and held by nothing").help(
-                "write it as `name = Configuration { … }` inside `ConfiguratorConf { … }`; where a name stands twice \
-                 in one table, Lua keeps the last only",
-            ));
+            self.cx.report(
+                finding
+                    .at(value.origin)
+                    .labelled("made, and held by nothing")
+                    .help("write it as `name = Configuration { … }` inside `ConfiguratorConf { … }`"),
+            );
         }
     }
 
     /// Changes that no configuration holds.
     fn unused(&mut self) {
-        if self.has_undefined() {
+        if self.has_lost() {
             return;
         }
         for index in 0..self.made.len() {

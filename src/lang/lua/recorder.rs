@@ -56,6 +56,8 @@ pub struct Recorder {
     pub instructions: u64,
     /// Set once; from then on every instruction of the file fails.
     pub exhausted: Option<Exhausted>,
+    /// Whether keys stand twice in a table.
+    pub has_lost: bool,
     /// Names of which it was said already that they are undefined.
     pub undefined: FxHashSet<String>,
     /// Whether the text is being parsed, not run.
@@ -135,7 +137,12 @@ impl Recorder {
         node
     }
 
-    /// Whether the file uses names that are not defined. What they should have held is lost, and no news.
+    /// Whether what the file makes is lost, and no news: to names that are not defined, or where a key stands again.
+    pub fn has_lost(&self) -> bool {
+        self.has_lost || self.has_undefined()
+    }
+
+    /// Whether the file uses names that are not defined.
     pub fn has_undefined(&self) -> bool {
         self.undefined.iter().any(|name| !name.starts_with('\0'))
     }
