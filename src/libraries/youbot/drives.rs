@@ -61,6 +61,8 @@ pub enum DriveHappening {
     Calibrated,
     /// A calibration did not find the stops.
     CalibrationFailed,
+    /// The torques of an unfolding fitted no arm that it could be: what was known of it stays.
+    NotIdentified,
     /// A motion ended.
     Arrived,
     /// A motion did not reach its end: something is in the way. The arm is held where it began, or where it cannot get on.

@@ -34,6 +34,7 @@ struct Events {
     cooled: EventName,
     calibrated: EventName,
     calibration_failed: EventName,
+    not_identified: EventName,
     arrived: EventName,
     blocked: EventName,
     dropped: EventName,
@@ -203,6 +204,9 @@ impl Component for Driver {
                 cooled: b.doc("The motor that gave too much for too long has cooled down.").event("e_I2T_EXCEEDED_EXIT"),
                 calibrated: b.doc("Its calibration is done.").event("e_calibrated"),
                 calibration_failed: b.doc("Its calibration failed.").event("e_calibration_failed"),
+                not_identified: b
+                    .doc("The torques of its unfolding fit no arm that it could be: it goes on as it is known, at first as the model has it.")
+                    .event("e_not_identified"),
                 arrived: b.doc("A motion that it was asked for has come to its end.").event("e_arrived"),
                 blocked: b.doc("Something is in the way of a motion that it was asked for.").event("e_motion_blocked"),
                 dropped: b.doc("The drives went off, and nothing holds the arm up.").event("e_arm_dropped"),
@@ -267,6 +271,7 @@ impl Component for Driver {
             DriveHappening::SoftLimitExit => events.raise(names.soft_limit_exit),
             DriveHappening::CommandWatchdog => events.raise(names.command_watchdog),
             DriveHappening::BaseWatchdog => events.raise(names.base_watchdog),
+            DriveHappening::NotIdentified => events.raise(names.not_identified),
             DriveHappening::Calibrated | DriveHappening::Arrived => {
                 events.raise(if what == DriveHappening::Arrived { names.arrived } else { names.calibrated });
                 if let Some(ticket) = task.take() {

@@ -163,7 +163,12 @@ impl Drives {
                 // The motion has ended when the arm is there, not when it should be.
                 if over >= 0.0 && (self.measured.q - motion.to).amax() < ARRIVAL_ERROR {
                     self.task = DriveTask::Idle;
-                    self.identified = self.identification.found().or(self.identified);
+                    let found = self.identification.found();
+                    // An arm that is folded, or goes back, takes no torques after that.
+                    if found.is_none() && !motion.folds && !fails {
+                        report(DriveHappening::NotIdentified);
+                    }
+                    self.identified = found.or(self.identified);
                     report(if fails { DriveHappening::MotionFailed } else { DriveHappening::Arrived });
                 } else if blocked && fails {
                     self.hold();

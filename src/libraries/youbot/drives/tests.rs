@@ -376,12 +376,16 @@ fn unfolded(mass: f64, friction: f64, push: Vector3<f64>) -> Option<ArmScales> {
     assert_eq!(drives.identified(), None, "calibrating tells nothing");
     drives.unfold().unwrap();
     let mut encoders = Encoders::default();
+    let mut heard = Vec::new();
     for _ in 0..6000 {
         let (q, qd) = encoders.read(&drives.body.arm.q, 0.001);
         let measured = Measured { q, qd, base: Twist2::default() };
-        let driven = drives.drives.update(measured, None, None, 0.001, &mut |_| {});
+        let driven = drives.drives.update(measured, None, None, 0.001, &mut |what| heard.push(what));
         drives.body.advance(&driven.torque, driven.twist, &push, driven.braked, 0.001);
     }
+    let told = |what| heard.contains(&what);
+    let arrived = told(DriveHappening::Arrived);
+    assert_eq!(told(DriveHappening::NotIdentified), arrived && drives.identified().is_none(), "{heard:?}");
     drives.identified()
 }
 
