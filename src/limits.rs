@@ -225,6 +225,13 @@ pub const TEXT_NODES: usize = 1_000_000;
 /// many in a large text is not searched for ever.
 pub const SLIP_BYTES: usize = 64 * 1024 * 1024;
 
+/// Bytes of large elements ([`PLACE_LARGE`]) in which the words are looked for that findings are about; past it a finding points at the
+/// element around them. A second or two, for files that mean harm.
+pub const PLACE_BYTES: usize = 32 * 1024 * 1024;
+
+/// Bytes of an element that is large: one that people write has some hundreds.
+pub const PLACE_LARGE: usize = 64 * 1024;
+
 /// Names that one event of a foreign SCXML document is taken to mean beside itself (those that begin with it); past it a warning
 /// says that they are not all.
 pub const SCXML_NAMES: usize = 100;

@@ -1,10 +1,12 @@
 //! Where model elements were written.
 
 use super::{extent, yaml_extent};
+use crate::limits;
 use crate::model::Origin;
+use rustc_hash::FxHashMap;
 use std::borrow::Cow;
 use std::ops::Range;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// A file of a source map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
@@ -98,6 +100,26 @@ pub struct SourceMap {
     files: Vec<SourceFile>,
     places: Vec<TextPlace>,
     speller: Option<Speller>,
+    large: Large,
+}
+
+/// What looking in large elements came to. A copy, whose places may be others from then on, begins anew.
+#[derive(Debug, Default)]
+struct Large(Mutex<LargeElements>);
+
+impl Clone for Large {
+    fn clone(&self) -> Self {
+        Self::default()
+    }
+}
+
+/// Words that were looked for in large elements.
+#[derive(Debug, Default)]
+struct LargeElements {
+    /// Bytes that were looked through, against [`limits::PLACE_BYTES`].
+    bytes: usize,
+    /// What was found.
+    found: FxHashMap<u32, Location>,
 }
 
 /// What a text is in a finding about a file of that language: the examples in it, which stand between backticks, are written as Lua has them.
@@ -105,7 +127,7 @@ pub type Speller = fn(Language, &str) -> String;
 
 impl Default for SourceMap {
     fn default() -> Self {
-        Self { files: Vec::new(), places: vec![TextPlace::Nowhere], speller: None }
+        Self { files: Vec::new(), places: vec![TextPlace::Nowhere], speller: None, large: Large::default() }
     }
 }
 
@@ -226,18 +248,44 @@ impl SourceMap {
             words.push(&**word);
             at = *parent;
         }
-        let (file, mut span) = self.base(at)?;
-        let source = self.file(file);
-        let mut inside = self.reach(at, file, &span);
-        while let Some(word) = words.pop() {
-            let on_line = matches!(self.places.get(at.0 as usize), Some(TextPlace::Line { .. })) && inside == span;
-            let far = || extent::find_in_element(&source.text, inside.clone(), word);
-            let found = on_line.then(far).flatten();
-            let Some(found) = found.or_else(|| extent::find(&source.text, inside.clone(), word)) else { continue };
-            inside = extent::reach_of_key(&source.text, &found, inside.end);
+        let (file, span) = self.base(at)?;
+        if words.is_empty() {
+            return Some(self.location(file, span));
+        }
+        if let Some(found) = self.large().found.get(&origin.0) {
+            return Some(found.clone());
+        }
+        // Past the budget the element around it is shown.
+        if self.is_tired() {
+            return Some(self.location(file, span));
+        }
+        let inside = self.reach(at, file, &span);
+        let is_large = self.looks_through(inside.len());
+        let is_line = matches!(self.places.get(at.0 as usize), Some(TextPlace::Line { .. }));
+        let found = self.location(file, self.find(file, (span, inside), is_line, &words));
+        if is_large {
+            self.large().found.insert(origin.0, found.clone());
+        }
+        Some(found)
+    }
+
+    /// The bytes of the innermost of these words, which is the first; what is not there is passed over.
+    fn find(
+        &self,
+        file: FileId,
+        (mut span, mut inside): (Range<usize>, Range<usize>),
+        is_line: bool,
+        words: &[&str],
+    ) -> Range<usize> {
+        let text = &self.file(file).text;
+        for word in words.iter().rev() {
+            let far = || extent::find_in_element(text, inside.clone(), word);
+            let found = (is_line && inside == span).then(far).flatten();
+            let Some(found) = found.or_else(|| extent::find(text, inside.clone(), word)) else { continue };
+            inside = extent::reach_of_key(text, &found, inside.end);
             span = found;
         }
-        Some(self.location(file, span))
+        span
     }
 
     /// Where a part of the element at `origin` stands: the token `word` inside it, if it is there; of a name of several parts also the last
@@ -246,7 +294,7 @@ impl SourceMap {
         if let Some(found) = self.locate_word(origin, word) {
             return Some(found);
         }
-        let whole = self.locate(origin)?;
+        let whole = self.locate(origin).filter(|_| !self.is_tired())?;
         let source = self.file(whole.file);
         let inside = self.inside(origin, &whole);
         let found = match word.split_once('/') {
@@ -270,8 +318,26 @@ impl SourceMap {
         }
     }
 
+    fn large(&self) -> MutexGuard<'_, LargeElements> {
+        self.large.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Whether so much was looked through that it is time to say less exactly where things stand.
+    fn is_tired(&self) -> bool {
+        self.large().bytes > limits::PLACE_BYTES
+    }
+
+    /// So many bytes are; whether they are many: few are nothing that adds up.
+    fn looks_through(&self, bytes: usize) -> bool {
+        let is_large = bytes > limits::PLACE_LARGE;
+        if is_large {
+            self.large().bytes += bytes;
+        }
+        is_large
+    }
+
     fn locate_word(&self, origin: Origin, word: &str) -> Option<Location> {
-        let whole = self.locate(origin)?;
+        let whole = self.locate(origin).filter(|_| !self.is_tired())?;
         let source = self.file(whole.file);
         let of_lines = !matches!(self.places.get(origin.0 as usize), Some(TextPlace::Exact { .. }));
         if of_lines && source.line(whole.line).end == whole.span.end {
@@ -281,6 +347,7 @@ impl SourceMap {
             return found.map(|span| self.location(whole.file, span));
         }
         let inside = self.inside(origin, &whole);
+        self.looks_through(inside.len());
         Some(self.location(whole.file, extent::find(&source.text, inside, word)?))
     }
 

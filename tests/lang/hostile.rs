@@ -244,6 +244,18 @@ fn values_are_finite() {
     assert_eq!(yaml(huge), ["text::wrong_type"]);
 }
 
+/// Where a large element holds many mistakes, looking for each in it would take for ever: past a budget the element is shown.
+#[test]
+fn mistakes_in_something_huge_are_not_looked_for_for_ever() {
+    let keys: Vec<String> = (0..20_000).map(|i| format!("k{i} = 'v{i}'")).collect();
+    let loaded = with_configurations(&format!("ConfiguratorConf {{ {} }}", keys.join(", ")));
+    let all = davit::diagnostics::to_json(&loaded.findings, &loaded.sources);
+    let columns: Vec<u64> = all.as_array().unwrap().iter().map(|f| f["column"].as_u64().unwrap()).collect();
+    assert_eq!(columns.len(), davit::limits::FINDINGS);
+    assert!(columns[0] > 18 && columns[80] > columns[0], "exactly at first: {:?}", &columns[..81]);
+    assert!(columns[120..].iter().all(|column| *column == 1), "{:?}", &columns[120..]);
+}
+
 #[test]
 fn duplicates_are_found() {
     let twice = "ConfiguratorConf { a = Configuration { }, a = Configuration { destroy('A') } }";
