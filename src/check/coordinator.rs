@@ -109,6 +109,13 @@ pub fn answers(deployment: &Deployment, chart: &Chart) -> BTreeSet<EventName> {
     answers
 }
 
+/// The names under which these configurations may be meant by a name.
+fn asked_for(ids: &[&str], name: &str) -> Vec<String> {
+    // `run.udno` is nearer to what undoes `run` than to `run`.
+    let undos = ids.iter().filter(|_| name.contains('.')).map(|id| format!("{id}.undo"));
+    ids.iter().map(|id| (*id).to_owned()).chain(undos).collect()
+}
+
 fn raised(deployment: &Deployment, chart: &Chart, findings: &mut Findings) {
     let ids: Vec<&str> = deployment.configurations.iter().map(|c| c.id.as_str()).collect();
     let mut unknown = BTreeSet::new();
@@ -129,10 +136,8 @@ fn raised(deployment: &Deployment, chart: &Chart, findings: &mut Findings) {
             continue;
         }
         let (id, undo) = site.name.as_str().strip_suffix(".undo").map_or((site.name.as_str(), ""), |id| (id, ".undo"));
-        let candidates = ids.iter().copied().chain(emits.iter().map(|e| e.as_str()).filter(|_| undo.is_empty()));
-        // `run.udno` is nearer to what undoes `run` than to `run`.
-        let undos: Vec<String> = ids.iter().filter(|_| id.contains('.')).map(|id| format!("{id}.undo")).collect();
-        let help = did_you_mean(id, "configurations", candidates.chain(undos.iter().map(String::as_str)));
+        let (asked_for, emitted) = (asked_for(&ids, id), emits.iter().map(|e| e.as_str()).filter(|_| undo.is_empty()));
+        let help = did_you_mean(id, "configurations", asked_for.iter().map(String::as_str).chain(emitted));
         let message = if site.scoped || !undo.is_empty() {
             format!("there is no configuration `{id}`")
         } else {
@@ -207,7 +212,11 @@ fn heard(deployment: &Deployment, chart: &Chart, known: &KnownEvents<'_>, findin
                     .at(at)
                     .labelled("waits for it")
                     .also(deployment.key_origin("configurations"), "the configurations of the deployment")
-                    .help(did_you_mean(id, "configurations", ids.iter().copied())),
+                    .help(did_you_mean(
+                        id,
+                        "configurations",
+                        asked_for(&ids, id).iter().map(String::as_str),
+                    )),
                 );
             } else if Verdict::ENDINGS.iter().any(|s| s.trim_start_matches('.') == suffix.trim_start_matches('.')) {
                 let undo = text.contains(".undo") || text.ends_with(".undone");

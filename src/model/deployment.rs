@@ -282,12 +282,15 @@ impl Deployment {
 
     /// Whether an event is spelt like an answer of the configurator: it ends like one, or is about a configuration or `undo`.
     pub fn looks_like_answer(&self, event: &str) -> bool {
+        let is_one = |id: &str| ConfigId::new(id).is_ok_and(|id| self.configuration(id).is_some());
         match Verdict::split(event) {
-            Some((subject, _)) => ConfigId::new(subject).is_ok(),
+            // `park.udno.failed`: no name of a configuration, and one begins it.
+            Some((subject, _)) => {
+                ConfigId::new(subject).is_ok() || subject.split_once('.').is_some_and(|(id, _)| is_one(id))
+            }
             None => event.rsplit_once('.').is_some_and(|(subject, _)| {
                 let subject = subject.strip_suffix(UNDO).unwrap_or(subject);
-                subject == Ask::Undo.subject()
-                    || ConfigId::new(subject).is_ok_and(|id| self.configuration(id).is_some())
+                subject == Ask::Undo.subject() || is_one(subject)
             }),
         }
     }

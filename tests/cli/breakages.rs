@@ -119,6 +119,13 @@ const MISTAKES: &[Mistake] = &[
     error(K, "config = \"slow\"", "config = \"slwo\"", "coord::unknown_request", "`slow`"),
     error(K, "\"create_all.ok\"", "\"creat_all.ok\"", "coord::unknown_answer", "`create_all`"),
     error(K, "\"create_all.ok\"", "\"create_all.okay\"", "coord::unknown_answer", "`ok`"),
+    error(
+        K,
+        "\"connect_all.failed\", ",
+        "\"connect_all.failed\", \"connect_all.udno.failed\", ",
+        "coord::unknown_answer",
+        "`connect_all.undo`",
+    ),
     warning(K, "\"create_all.ok\"", "\"create_all.ok\", \"rename.ok\"", "coord::answer_never_comes", "`rename`"),
     warning(K, "\"e_shutdown\"", "\"e_shutdwon\"", "coord::near_event", "`e_shutdown`"),
     // What the coordinator does.
