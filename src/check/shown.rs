@@ -82,6 +82,7 @@ pub const READ: &[(&str, &[Code])] = &[
             TYPE_CIRCLE,
             TYPE_DIFFERS,
             TYPE_EXCLUSIVE,
+            TYPE_NO_EVENT,
             TYPE_UNKNOWN_OPERATION,
             TYPE_UNKNOWN_TYPE,
             TYPE_WITHOUT_CODE,

@@ -1,6 +1,8 @@
 //! The component types that a deployment declares.
 
-use crate::model::codes::{TYPE_CIRCLE, TYPE_EXCLUSIVE, TYPE_UNKNOWN_OPERATION, TYPE_UNKNOWN_TYPE, TYPE_WITHOUT_CODE};
+use crate::model::codes::{
+    TYPE_CIRCLE, TYPE_EXCLUSIVE, TYPE_NO_EVENT, TYPE_UNKNOWN_OPERATION, TYPE_UNKNOWN_TYPE, TYPE_WITHOUT_CODE,
+};
 use crate::model::finding::did_you_mean;
 use crate::model::{Catalogue, ComponentType, Deployment, Effect, Finding, Findings, Ident, Tunable, TypeName};
 use std::collections::{BTreeSet, VecDeque};
@@ -24,6 +26,17 @@ pub fn check(deployment: &Deployment, catalogue: &Catalogue) -> Findings {
                     .help(did_you_mean(other.as_str(), "types", known)),
                 );
             }
+        }
+        for event in ty.raises.keys() {
+            let Some(message) = deployment.never_from_outside(event.as_str()) else { continue };
+            let path = format!("types.{}.raises", ty.name);
+            findings.push(
+                Finding::error(TYPE_NO_EVENT, message)
+                    .at(deployment.key_origins.get(&path).copied().unwrap_or(ty.origin))
+                    .path(path)
+                    .labelled("no event of a component")
+                    .help("list events that components raise: `raises: [e_arrived]`"),
+            );
         }
         for (name, operation) in &ty.operations {
             let Effect::Undo(undo) = operation.effect else { continue };

@@ -257,6 +257,9 @@ codes! {
         "What a component holds for itself must not become something else while it holds it: a property in braces is one of the type, of type string, int \
          or bool, and `tunable: unconfigured`. Mark the property so, or name the thing without it. Nor may an operator choose it without force (`operator:`): any value \
          may be that of another component.";
+    TYPE_NO_EVENT = "type::no_event", "a component type says that its components raise what none can",
+        "`raises:` lists events of components. Answers to requests (`park.ok`), requests, what is told of subsystems by itself, and events of the \
+         statechart itself are raised by nobody but Davit. Leave it out, or give the event another name.";
     TYPE_WITHOUT_CODE = "type::without_code", "a component of a type that is only declared, on a platform that needs its code",
         "Types under `types:` say which ports, properties and operations a component has, not what it does. The simulated \
          platform runs them all the same; the embedded platform needs the code, which comes with a library. Use \

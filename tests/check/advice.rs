@@ -136,6 +136,11 @@ fn a_slip_in_what_a_component_raises_is_told_by_its_type() {
     assert_eq!(told(&["e_arrived", "e_arived"]), [slip], "where it is waited for elsewhere, too");
     assert!(told(&["e_arrived"]).is_empty());
     assert_eq!(told(&["e_axi2s_fell"]).len(), 1, "a number in another place is a slip");
+    let small = Small::new(CONFIGURATIONS, STATES, "");
+    small.demo.replace("small.yaml", "    operations:", "    raises: [e_arrived, run.ok]\n    operations:");
+    let said = small.check();
+    let found = texts(&said, "type::no_event");
+    assert!(found.len() == 1 && found[0].0.starts_with("`run.ok` is an answer of the configurator"), "{:#}", said.0);
     assert!(told(&["e_axis1_fell"]).is_empty() && told(&["e_axis12_fell"]).is_empty(), "another number is none");
 }
 

@@ -90,10 +90,12 @@ fn note_keys(entries: &[Entry], prefix: &str, out: &mut BTreeMap<String, Origin>
     }
 }
 
-/// Notes where a type names others.
+/// Notes where a type lists names.
 fn note_orders(ty: &Entry, out: &mut BTreeMap<String, Origin>) {
     let Kind::Map(keys) = &ty.value.kind else { return };
-    for entry in keys.iter().filter(|entry| matches!(&*entry.key, "start_after" | "stop_before" | "exclusive")) {
+    for entry in
+        keys.iter().filter(|entry| matches!(&*entry.key, "start_after" | "stop_before" | "exclusive" | "raises"))
+    {
         note_keys(std::slice::from_ref(entry), &format!("types.{}", ty.key), out);
     }
 }
