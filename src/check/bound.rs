@@ -57,6 +57,8 @@ pub enum Bound {
     Stopping,
     /// A coordinator that is down goes on while others, followed apart, are not.
     Apart,
+    /// A subsystem that is down goes on by itself, by a time.
+    ByItself,
     /// [`limits::CHECK_STOPPING`]: that a coordinator begins again while others, followed apart, are led down.
     Anew,
     /// What a safe configuration of coordinators that are followed apart interrupts behind something that failed, and what comes while
@@ -155,6 +157,7 @@ impl Bound {
                 "what leads a coordinator on that is down already, while others that it has nothing to do with are not, was not followed"
                     .to_owned()
             }
+            Self::ByItself => "what its parent comes to where it goes on by itself though it is down was not followed".to_owned(),
             Self::Anew => {
                 "what comes of the event that begins the deployment was not followed where a coordinator is down already and others that it \
                  has nothing to do with are still being led down"

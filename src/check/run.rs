@@ -238,6 +238,9 @@ fn follow(
             if graph.product.others && graph.goes_on_when_down(true) {
                 graph.cut(Bound::Apart, Failed::Nothing);
             }
+            if around.parent.is_some() && graph.goes_on_when_down(true) {
+                graph.cut(Bound::ByItself, Failed::Nothing);
+            }
             if graph.goes_on_when_down(false) {
                 graph.cut(Bound::Stale, Failed::Nothing);
             }

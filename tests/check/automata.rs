@@ -110,3 +110,22 @@ fn to_let_go_twice_is_to_let_go() {
     let warned: Vec<&Finding> = found.iter().filter(|finding| finding.severity > Severity::Info).collect();
     assert!(warned.is_empty(), "{warned:#?}");
 }
+
+/// Nobody leads it down again where its parent is down: its coordinator hears of no shutdown.
+#[test]
+fn a_subsystem_that_goes_on_by_itself_when_it_is_down_is_not_called_sound() {
+    let begins = "trans { src = 'initial', tgt = 'idle' },";
+    let goes_on = format!("{begins} trans {{ src = 'idle', tgt = 'undone', events = {{ 'e_after(0.1)' }} }},");
+    let loaded = load(&files(&[("arm.lua", begins, &goes_on)]), "pair.yaml", &[]);
+    let deployment = loaded.deployment.unwrap_or_else(|| panic!("{:#?}", loaded.findings));
+    let catalogue = catalogue(&deployment);
+    let report = check::run(deployment, &catalogue);
+    let told = |left: &String| left.contains("goes on by itself though it is down");
+    assert!(
+        report.verdict != CheckVerdict::Sound && report.left.iter().any(told),
+        "{:#?} {:#?}",
+        report.findings,
+        report.left
+    );
+    assert!(!report.explored.complete);
+}
