@@ -42,6 +42,17 @@ fn long_end(text: &[u8], from: usize, level: usize) -> (usize, usize) {
     (text.len(), text.len())
 }
 
+/// The length of what stands at the beginning of a piece of a text in quotes: a byte, or an escape that could hide how it goes on.
+fn escape(text: &[u8]) -> usize {
+    match text {
+        // It takes all blanks after it along, and the ends of lines.
+        [b'\\', b'z', rest @ ..] => 2 + rest.iter().take_while(|byte| byte.is_ascii_whitespace()).count(),
+        [b'\\', b'\r', b'\n', ..] => 3,
+        [b'\\', _, ..] => 2,
+        _ => 1,
+    }
+}
+
 /// The next token at or after `at`, with its bytes; none at the end. Comments are skipped.
 pub fn next_token(text: &[u8], mut at: usize) -> Option<(Range<usize>, LuaToken)> {
     loop {
@@ -59,7 +70,7 @@ pub fn next_token(text: &[u8], mut at: usize) -> Option<(Range<usize>, LuaToken)
         } else if byte == b'"' || byte == b'\'' {
             let mut end = at + 1;
             while end < text.len() && text[end] != byte && text[end] != b'\n' {
-                end += if text[end] == b'\\' { 2 } else { 1 };
+                end += escape(&text[end..]);
             }
             let end = end.min(text.len());
             return Some((at..(end + 1).min(text.len()), LuaToken::Text(at + 1..end)));

@@ -129,6 +129,8 @@ mod tests {
             "f{ g = function() for i = 1, 2 do local i = 1; i = 2 end repeat j = 1; j = 2 until j == 2 end }",
             "f{ a = b == c, b = a ~= c, c = a <= b }",
             "f{ '}', a = 1, [[ a = 2, ]], --[[ a = 3, ]] b = 1, \"a = 4, \" }",
+            "f{ s = 'it reads \\z\n  on, s = 1' }",
+            "f{ a = 'b\\\r\n, a = 1, a = 2' }",
             "f{ [a] = 1, [a] = 2, [1] = 2, [1] = 3 }",
             "f{ g(a, b), a = 1, b = g(a, { b = 2 }) }",
             "} ) end a = 1, a = 2",
