@@ -8,6 +8,7 @@
 
 local real = param("real", false)
 local times = param("times", real and 2000 or 200)
+assert(times >= 1, "`times` is how often each is measured: 1 at least")
 deploy("../../deployments/youbot_coupling.yaml")
 
 local function told(name, seconds, max_us)
@@ -22,6 +23,7 @@ local function at_share(sorted, share) return sorted[math.max(1, math.ceil(share
 local function applied(since, of)
   local asked, took = {}, {}
   for _, it in ipairs(log{ since = since }) do
+    assert(it.what ~= "missed", "the log does not reach back so far")
     if it.what == "requested" and it.request and it.ask:find(of) then asked[it.request] = it.at end
     if it.what == "answered" and asked[it.request] then
       assert(it.ok, it.answer)
@@ -63,13 +65,19 @@ figure{ name = "bring-up of one: steps", value = steps }
 told("bring-up of one: all configurations in which nothing moves", seconds, 50000)
 
 -- One profile for another: two values are taken back, and two set.
-local since, profile = now(), "soft"
-for _ = 1, times do
+local took, since, profile = {}, now(), "soft"
+for nth = 1, times do
   profile = profile == "soft" and "stiff" or "soft"
   apply("left/profile_" .. profile, { force = true })
   wait_answer("left/profile_" .. profile .. ".ok", 1)
+  -- The log reaches some hundred of them back.
+  if nth % 100 == 0 or nth == times then
+    for _, it in ipairs(applied(since, "^left/profile_")) do table.insert(took, it) end
+    wait(0.001)
+    since = now()
+  end
 end
-local took = applied(since, "^left/profile_")
+assert(#took == times, #took .. " of " .. times .. " were found in the log")
 table.sort(took, function(a, b) return a.seconds < b.seconds end)
 figure{ name = "a switch: steps", value = took[1].steps }
 told("a switch: from the request to its answer, median", at_share(took, 0.5).seconds or 0, 200)

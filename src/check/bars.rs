@@ -124,7 +124,7 @@ impl Graph<'_, '_> {
             return comes;
         }
         let mut hears = Vec::with_capacity(self.states.len());
-        for state in &self.states {
+        for state in &self.reached.states {
             let members = self.product.members.iter_mut().zip(&state.leaves);
             hears.push(members.into_iter().any(|(member, leaf)| member.takes(*leaf, names[0])));
         }

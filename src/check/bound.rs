@@ -75,6 +75,9 @@ pub enum Bound {
 }
 
 impl Bound {
+    /// Where one of these cut something off, there is no telling what.
+    pub(super) const CUT_OFF: [Self; 5] = [Self::Budget, Self::States, Self::Memory, Self::Interrupted, Self::Entered];
+
     /// What a bound left out; `failed` is what had to fail before, at least, and so many batches of a coordinator waited.
     pub(super) fn told(self, failed: Failed, most_waiting: usize, effort: &Effort<'_>) -> String {
         let what = match self {

@@ -89,8 +89,8 @@ impl Product<'_> {
         let simulated = deployment.kind.imitates;
         let reacts = simulated && deployment.reactions.iter().any(|reaction| reaction.raise == name);
         let watched = || deployment.monitors.iter().flat_map(Monitor::events).any(|event| event == name);
-        // What a subsystem tells nobody can refuse.
-        if self.is_told_by_child(name) || deployment.stays_open(name.as_str()) {
+        // What a subsystem tells nobody can refuse. That something fails nobody can promise, though they may tell it by hand.
+        if self.is_told_by_child(name) || deployment.stays_open(name.as_str()) && !fails(name) {
             Raises::Somebody
         } else if reacts || fails(name) || watched() {
             Raises::Sometimes

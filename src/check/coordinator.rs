@@ -29,7 +29,7 @@ pub fn bad_answers(ask: Ask) -> [EventName; 2] {
 pub fn check(deployment: &Deployment, chart: &Chart, known: &KnownEvents<'_>) -> Findings {
     let mut findings = Vec::new();
     states(deployment, chart, &mut findings);
-    raised(deployment, chart, &mut findings);
+    raised(deployment, chart, known, &mut findings);
     heard(deployment, chart, known, &mut findings);
     findings
 }
@@ -116,18 +116,18 @@ fn asked_for(ids: &[&str], name: &str) -> Vec<String> {
     ids.iter().map(|id| (*id).to_owned()).chain(undos).collect()
 }
 
-fn raised(deployment: &Deployment, chart: &Chart, findings: &mut Findings) {
+fn raised(deployment: &Deployment, chart: &Chart, known: &KnownEvents<'_>, findings: &mut Findings) {
     let ids: Vec<&str> = deployment.configurations.iter().map(|c| c.id.as_str()).collect();
     let mut unknown = BTreeSet::new();
     let emits: BTreeSet<EventName> = deployment.emits.iter().map(|(e, _)| *e).collect();
     for site in chart.raises() {
-        let known = match Raise::of(site.name, |id| deployment.configuration(id).is_some()) {
+        let is_known = match Raise::of(site.name, |id| deployment.configuration(id).is_some()) {
             Raise::Request(_) => true,
             Raise::UnknownUndo => false,
             Raise::Event => emits.contains(&site.name),
         };
         // The undo of a state-scoped configuration was not written by anybody; its entry is reported.
-        if known || (site.scoped && matches!(site.when, RaiseMoment::Exit(_))) {
+        if is_known || (site.scoped && matches!(site.when, RaiseMoment::Exit(_))) {
             continue;
         }
         unknown.insert(site.name);
@@ -149,9 +149,10 @@ fn raised(deployment: &Deployment, chart: &Chart, findings: &mut Findings) {
                 .labelled("raised here")
                 .path(place(chart, site.when))
                 .also(deployment.key_origin("configurations"), "the configurations of the deployment")
-                .help(match id.contains('.') {
-                    true => help,
-                    false => format!("{help}; an event that is meant to leave the deployment is listed under `emits`"),
+                .help(match known.waited_for_as(id).filter(|_| undo.is_empty()) {
+                    Some(near) => format!("did you mean `{near}`, which is waited for and nobody raises?"),
+                    None if id.contains('.') => help,
+                    None => format!("{help}; an event that is meant to leave the deployment is listed under `emits`"),
                 }),
         );
     }

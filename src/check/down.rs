@@ -56,7 +56,9 @@ impl Graph<'_, '_> {
         };
         let deployment = self.product.deployment;
         let state = &self.states[at as usize];
-        let finding = if several {
+        let finding = if let Some(finding) = self.is_down_alone(state) {
+            finding
+        } else if several {
             let message = format!("from {} no way leads down together", self.product.place(state));
             Finding::warning(COORD_NO_WAY_DOWN, message)
                 .at(deployment.key_origin("shutdown.down"))
@@ -189,6 +191,9 @@ impl Graph<'_, '_> {
     /// Nothing but that leads down from a state in which it is being stopped. `reaches`: where it does.
     fn barred(&self, at: u32, barred: Barred, bars: &[Option<Barred>], reaches: &[bool]) -> Finding {
         let (deployment, state) = (self.product.deployment, &self.states[at as usize]);
+        if let Some(finding) = self.is_down_alone(state) {
+            return finding;
+        }
         let (event, place) = (deployment.shutdown.event, self.product.place(state));
         let by = self.led_on_by(at, barred, bars, reaches);
         let named = by.map(|by| self.product.named(by)).unwrap_or_default();
@@ -239,6 +244,28 @@ impl Graph<'_, '_> {
             .at(self.product.members[late].chart.origin(state.leaves[late]))
             .path("shutdown.event")
             .help(format!("{help}; else what is left is taken down without the coordinator"))
+    }
+
+    /// All are in *down*, and a subsystem is not: nobody is there to lead it down.
+    fn is_down_alone(&self, state: &ProductState) -> Option<Finding> {
+        let (product, event) = (&*self.product, self.product.deployment.shutdown.event);
+        let up = || product.children_up(state);
+        let first = up().next().filter(|_| product.all_in(state, |member| member.down))?;
+        let names: Vec<String> = up().map(|child| format!("`{}`", child.path)).collect();
+        let (place, verb) = (product.place(state), if names.len() == 1 { "is" } else { "are" });
+        let message = format!(
+            "in `{place}`, which means down, {} {verb} not down, and nobody leads them there when `{event}` comes",
+            names.join(" and ")
+        );
+        let finding = Finding::warning(COORD_NO_WAY_DOWN, message)
+            .at(product.members[0].chart.origin(state.leaves[0]))
+            .path("shutdown.down")
+            .also(product.deployment.key_origin("shutdown.down"), "the state that means down")
+            .help(format!(
+                "lead it down before, and wait for `{}` on the way there; else it is taken down by force",
+                first.down
+            ));
+        Some(finding)
     }
 
     /// The first move of that kind on the shortest way down.

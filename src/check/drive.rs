@@ -152,7 +152,8 @@ impl Product<'_> {
                 let comes = if first { wanted } else { !self.from_outside[usize::from(at)].told_between };
                 // Of subsystems what they tell where nothing fails in them. It is wanted up once.
                 let well = next.failed == Failed::Nothing || !self.is_told_by_child(name);
-                comes && well && name != tried.never && (first || tried.stopping || !wanted)
+                let reached = first || !tried.is_for_unreached(self, name);
+                comes && well && reached && name != tried.never && (first || tried.stopping || !wanted)
             }
             Move::Time(..) | Move::Confirmed(_) => !first,
             Move::Unheard(_) => !first && next.failed == Failed::Nothing,
@@ -245,7 +246,9 @@ pub(super) fn ways(product: &mut Product<'_>) -> Option<(Way, Option<Way>)> {
     let mut moves = settled(product, &start);
     let ready = moves.last().map_or(&start, |next| &next.state).clone();
     let (deploy, shutdown) = (deployment.deploy.event, deployment.shutdown.event);
-    let tried = Tried { first: deploy, never: shutdown, stopping: false, within: deployment.deploy.within };
+    let within = deployment.deploy.within;
+    let tried = Tried { first: deploy, never: shutdown, stopping: false, within, unreached: Vec::new() };
+    let tried = tried.from(product, &ready, |member| member.goal_up());
     let mut rise = way(product, ready, &tried, |member| member.goal_up());
     // From the start, not from where it was ready.
     moves.append(&mut rise.moves);
@@ -254,7 +257,9 @@ pub(super) fn ways(product: &mut Product<'_>) -> Option<(Way, Option<Way>)> {
         return Some((rise, None));
     }
     let top = rise.end().clone();
-    let tried = Tried { first: shutdown, never: deploy, stopping: true, within: deployment.shutdown.within };
+    let within = deployment.shutdown.within;
+    let tried = Tried { first: shutdown, never: deploy, stopping: true, within, unreached: Vec::new() };
+    let tried = tried.from(product, &top, |member| member.down);
     let fall = way(product, top, &tried, |member| member.down);
     Some((rise, Some(fall)))
 }

@@ -22,12 +22,20 @@ use crate::stack::Requester;
 use indexmap::IndexMap;
 use rustc_hash::{FxBuildHasher, FxHashMap, FxHashSet};
 use std::cell::OnceCell;
+use std::ops::{Deref, DerefMut};
 use std::rc::Rc;
 
-/// Everything that was followed.
+/// Everything that was followed of a product.
 pub struct Graph<'p, 'a> {
     /// The product.
     pub product: &'p mut Product<'a>,
+    /// What was reached in it: another one may be put there.
+    pub(super) reached: Reached,
+}
+
+/// What was reached: states, what leads from one to another, and what was found on the way.
+#[derive(Default)]
+pub struct Reached {
     /// The states, in the order they were met.
     pub states: MetStates,
     /// The worst that failed on the best way to each.
@@ -85,33 +93,30 @@ impl Ways {
     }
 }
 
+impl Reached {
+    /// Whether it was not followed to its end: for there is more of it than is to be followed, or because it had to end.
+    pub(super) fn is_cut_off(&self) -> bool {
+        Bound::CUT_OFF.iter().any(|bound| self.bounds.contains_key(bound))
+    }
+}
+
+impl Deref for Graph<'_, '_> {
+    type Target = Reached;
+
+    fn deref(&self) -> &Reached {
+        &self.reached
+    }
+}
+
+impl DerefMut for Graph<'_, '_> {
+    fn deref_mut(&mut self) -> &mut Reached {
+        &mut self.reached
+    }
+}
+
 /// Follows everything, within the budget.
 pub fn explore<'p, 'a>(product: &'p mut Product<'a>) -> Graph<'p, 'a> {
-    let mut graph = Graph {
-        product,
-        states: MetStates::default(),
-        failed: Vec::new(),
-        followed: Vec::new(),
-        edges: Chunks::default(),
-        moves: IndexMap::default(),
-        troubles: Vec::new(),
-        warned: Vec::new(),
-        deep: Vec::new(),
-        ends: FxHashSet::default(),
-        bounds: FxHashMap::default(),
-        pushes: FxHashMap::default(),
-        gone_round: FxHashMap::default(),
-        before_undo: None,
-        out: OnceCell::new(),
-        into: OnceCell::new(),
-        depth: Vec::new(),
-        open: Frontier::default(),
-        ways: FxHashMap::default(),
-        reacts: FxHashMap::default(),
-        in_vain: Vec::new(),
-        told: FxHashMap::default(),
-        rounds: FxHashMap::default(),
-    };
+    let mut graph = Graph { product, reached: Reached::default() };
     match graph.product.start() {
         Some(start) => {
             let at = graph.reach(start, Failed::Nothing, 0);
@@ -282,12 +287,12 @@ impl Graph<'_, '_> {
             next.stopping &= so_far.max(class) < Failed::Undo || !self.product.operator.is_empty();
             let to = self.reach(next, so_far.max(class), depth);
             if class == Failed::Nothing && !reacts.is_empty() {
-                self.reacts.insert(u32::try_from(self.edges.len()).unwrap_or(NOWHERE), reacts);
+                self.reached.reacts.insert(u32::try_from(self.reached.edges.len()).unwrap_or(NOWHERE), reacts);
             }
             let in_vain = told.iter().filter(|name| self.product.is_told_by_child(**name));
-            self.in_vain.extend(in_vain.map(|name| (at, *name)));
+            self.reached.in_vain.extend(in_vain.map(|name| (at, *name)));
             if !told.is_empty() {
-                self.told.insert(u32::try_from(self.edges.len()).unwrap_or(NOWHERE), told);
+                self.reached.told.insert(u32::try_from(self.reached.edges.len()).unwrap_or(NOWHERE), told);
             }
             let by = self.moved(by);
             let barred = self.moves[by as usize].filter(|_| state.stopping);
@@ -316,7 +321,7 @@ impl Graph<'_, '_> {
 
     fn moved(&mut self, by: Move) -> u32 {
         let known = self.moves.get_index_of(&by);
-        let number = known.unwrap_or_else(|| self.moves.insert_full(by, self.product.barred(by)).0);
+        let number = known.unwrap_or_else(|| self.reached.moves.insert_full(by, self.product.barred(by)).0);
         u32::try_from(number).unwrap_or(NOWHERE)
     }
 
@@ -340,7 +345,8 @@ impl Graph<'_, '_> {
 
     fn is_lean(&self, at: u32) -> bool {
         self.failed[at as usize] >= Failed::Undo
-            && self.before_undo.is_some_and(|before| self.product.behind.is_lean(before))
+            && !self.product.follows_behind
+            && self.before_undo.is_some_and(|before| before > limits::CHECK_LEAN)
     }
 
     /// What follows from a state: always the same.
@@ -353,7 +359,7 @@ impl Graph<'_, '_> {
 
     fn nexts_of(&mut self, at: u32) -> Nexts {
         let lean = self.is_lean(at);
-        let state = &self.states[at as usize];
+        let state = &self.reached.states[at as usize];
         if !lean {
             return self.product.nexts(state);
         }

@@ -191,7 +191,7 @@ impl Graph<'_, '_> {
                 let member = &mut self.product.members[number];
                 let chart = member.chart;
                 let events: Vec<EventId> = chart.events().iter().map(|event| chart.event(*event)).collect();
-                let leaves: FxHashSet<NodeId> = self.states.iter().map(|state| state.leaves[number]).collect();
+                let leaves: FxHashSet<NodeId> = self.reached.states.iter().map(|state| state.leaves[number]).collect();
                 for leaf in leaves {
                     let timed: Vec<EventId> = member.offers(leaf).iter().copied().collect();
                     for event in events.iter().chain(&timed) {

@@ -11,7 +11,6 @@ mod aside;
 mod automaton;
 mod automaton_draft;
 mod bars;
-mod behind;
 mod belief;
 mod bound;
 mod children;

@@ -156,7 +156,7 @@ impl Product<'_> {
                 next.beliefs.set(at, *then);
                 if takes.is_empty() && state.inbox.is_empty() {
                     self.hears_of_child(&mut next, name);
-                    nexts.all.push(Next::plain(Move::Unheard(place), next, *failed));
+                    nexts.all.push(Next::plain(Move::Unheard(place), self.settle(next), *failed));
                 } else {
                     let from = nexts.all.len();
                     self.raised(&next, name, Move::Event(place), nexts);
@@ -199,7 +199,7 @@ impl Product<'_> {
     fn unheard_shutdown(&mut self, state: &ProductState, heard: &HeardEvents, nexts: &mut Nexts) {
         let shutdown = self.deployment.shutdown.event;
         let Some(at) = self.outside.iter().position(|name| *name == shutdown) else { return };
-        if heard.contains(&at) || state.stopping || !self.minds_stopping || self.all_in(state, |member| member.down) {
+        if heard.contains(&at) || state.stopping || !self.minds_stopping || self.all_are_down(state) {
             return;
         }
         let leaving = state.leaving || self.minds_operators();

@@ -43,16 +43,9 @@ impl Graph<'_, '_> {
         how(self.product);
         let mut probe = explore(self.product);
         // Other bounds leave out what has little to do with it.
-        let ends = [
-            Bound::Budget,
-            Bound::States,
-            Bound::Memory,
-            Bound::Interrupted,
-            Bound::Entered,
-            Bound::Inbox,
-            Bound::Forks,
-        ];
-        let more = ends.iter().any(|bound| probe.bounds.contains_key(bound) && !self.bounds.contains_key(bound));
+        let ends = [Bound::Inbox, Bound::Forks];
+        let more = probe.is_cut_off() && !self.reached.is_cut_off()
+            || ends.iter().any(|bound| probe.bounds.contains_key(bound) && !self.reached.bounds.contains_key(bound));
         let differs = more || probe.judge().iter().any(|(finding, _)| finding.severity > Severity::Info);
         self.product.effort = effort;
         differs

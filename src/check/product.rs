@@ -11,7 +11,6 @@
 //! inboxes are empty.
 
 use super::aside::Aside;
-use super::behind::Behind;
 use super::children::{Child, WatchedSubsystem};
 use super::coordinator::outside_events;
 use super::coupling;
@@ -71,8 +70,9 @@ pub struct Product<'a> {
     pub races: bool,
     /// Batches of one coordinator that may be unanswered when the next event comes.
     pub most_waiting: usize,
-    /// How much is followed behind an undo that fails.
-    pub(super) behind: Behind,
+    /// Behind an undo that fails all is followed, and not one batch of a coordinator at a time without races where much comes before one
+    /// fails ([`limits::CHECK_LEAN`]).
+    pub(super) follows_behind: bool,
     /// Configurations that may be lost, and whether they stand for something. Those that do not are lost where the platform is
     /// found to differ: followed where somebody listens.
     pub losable: Vec<(ConfigId, bool)>,
@@ -157,7 +157,7 @@ impl<'a> Product<'a> {
             forked: false,
             races: true,
             most_waiting: limits::CHECK_WAITING,
-            behind: Behind::default(),
+            follows_behind: false,
             losable,
             tells_all: false,
             minds_stopping,
@@ -347,7 +347,7 @@ impl<'a> Product<'a> {
     pub(super) fn settle(&mut self, mut state: ProductState) -> ProductState {
         self.tell_standings(&mut state);
         // Where others are still to come down, the deployment is being stopped until they have.
-        state.stopping &= self.waits_for_others() || !(state.is_at_rest() && self.all_in(&state, |member| member.down));
+        state.stopping &= self.waits_for_others() || !self.is_down(&state);
         state.elsewhere &= state.stopping;
         if state.inbox.is_empty() {
             state.across = false;
@@ -423,7 +423,12 @@ impl<'a> Product<'a> {
 
     /// Whether all of them are down, with nothing left to be answered or heard.
     pub fn is_down(&self, state: &ProductState) -> bool {
-        state.is_at_rest() && self.all_in(state, |member| member.down) && self.children_down(state)
+        state.is_at_rest() && self.all_are_down(state)
+    }
+
+    /// Whether all of them are in *down*, and their subsystems are known to be down.
+    pub(super) fn all_are_down(&self, state: &ProductState) -> bool {
+        self.all_in(state, |member| member.down) && self.children_down(state)
     }
 
     /// Whether all of them have come to *down* and asked for nothing since.

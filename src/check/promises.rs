@@ -81,7 +81,12 @@ impl Product<'_> {
 
     /// Whether every subsystem is known to be down.
     pub(super) fn children_down(&self, state: &ProductState) -> bool {
-        (0..self.children.len()).all(|at| state.children & begun(at) == 0)
+        self.children_up(state).next().is_none()
+    }
+
+    /// The subsystems that were begun, and of which it is not known that they are down.
+    pub(super) fn children_up(&self, state: &ProductState) -> impl Iterator<Item = &Child> {
+        self.children.iter().enumerate().filter(|(at, _)| state.children & begun(*at) != 0).map(|(_, child)| child)
     }
 
     /// What is asked for or in force of what a subsystem exports though that need not be there, and of which subsystem.

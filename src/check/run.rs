@@ -204,23 +204,18 @@ fn follow(
             apart.stands_in(around);
         }
         let product = apart.as_mut().unwrap_or(&mut product);
-        let mut deeper = Deeper::new();
+        let mut deeper = Deeper::default();
         loop {
             product.follow_anew();
             product.effort = product.most_believed();
             let mut graph = explore(product);
-            if let Some(more) = deeper.too_much(&graph) {
-                product.follow_more(more, false);
-                continue;
-            }
-            if graph.product.knows_children() && graph.is_used_up() {
+            if !deeper.goes_back(&mut graph) && graph.product.knows_children() && graph.is_used_up() {
                 // With all that is known of them there is too much of it.
                 graph.product.forget_children();
                 graph.product.follow_with(effort);
                 continue;
             }
-            if let Some(more) = deeper.next(&graph) {
-                product.follow_more(more, true);
+            if deeper.goes_on(&mut graph) {
                 continue;
             }
             if !graph.product.minds_stopping {
@@ -249,8 +244,7 @@ fn follow(
             }
             found.extend(graph.judge());
             graph.probe(&found);
-            let cut = [Bound::Budget, Bound::States, Bound::Memory, Bound::Interrupted, Bound::Entered];
-            let verified = !cut.iter().any(|bound| graph.bounds.contains_key(bound));
+            let verified = !graph.is_cut_off();
             let shared = coupling::shared(deployment, charts, &numbers, verified);
             found.extend(shared.into_iter().map(|finding| (finding, Vec::new())));
             left.extend(

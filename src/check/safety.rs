@@ -54,7 +54,7 @@ impl Graph<'_, '_> {
             let said = class.and_then(|class| alike.get(&class).cloned());
             let (mut bad, mut places) = said.clone().unwrap_or_default();
             for at in order.iter().filter(|_| said.is_none()) {
-                let state = &self.states[*at as usize];
+                let state = &self.reached.states[*at as usize];
                 let (world, settled) = (state.world, state.inbox.is_empty() && state.in_transit.is_empty());
                 if !settled || !self.product.worlds.has_actuator(world) || self.product.is_down(state) {
                     continue;
@@ -63,7 +63,7 @@ impl Graph<'_, '_> {
                 if state.desk.is_empty() && !known.insert((state.leaves.clone(), world)) {
                     continue;
                 }
-                if leads_elsewhere((self.product, &self.states), state, event, &mut good).is_none() {
+                if leads_elsewhere((self.product, &self.reached.states), state, event, &mut good).is_none() {
                     continue;
                 }
                 bad.push(*at);
@@ -91,7 +91,8 @@ impl Graph<'_, '_> {
                  outermost state in which actuators exist serves for all inside"
             ));
             let state = self.states[at as usize].clone();
-            let on = leads_elsewhere((self.product, &self.states), &state, event, &mut good).unwrap_or_default();
+            let on =
+                leads_elsewhere((self.product, &self.reached.states), &state, event, &mut good).unwrap_or_default();
             let trace = self.trace_on(at, on);
             found.push((finding, trace));
         }

@@ -15,11 +15,11 @@ use rustc_hash::FxHashSet;
 use std::collections::VecDeque;
 
 /// Some of the coordinators, by their places; none: all of them.
-type Among<'p> = Option<&'p [usize]>;
+pub(super) type Among<'p> = Option<&'p [usize]>;
 
 impl Product<'_> {
     /// Whether these coordinators are all inside the goal.
-    fn are_in(&self, state: &ProductState, goal: Goal, part: Among<'_>) -> bool {
+    pub(super) fn are_in(&self, state: &ProductState, goal: Goal, part: Among<'_>) -> bool {
         let Some(part) = part else { return self.all_in(state, goal) };
         part.iter().all(|at| {
             let (member, leaf) = (&self.members[*at], state.leaves[*at]);
@@ -154,5 +154,17 @@ fn search(
     // What is refused, or has failed, on the way may not be in the way of another one.
     product.untimed |= unfollowed;
     let reached = reached.is_some();
-    Way { from, moves, reached, refused, failed, late: None, overtaken: None, unfollowed, in_this_order: false }
+    let unheard = tried.unreached.first().copied().filter(|_| !reached && refused.is_none() && failed.is_none());
+    Way {
+        from,
+        moves,
+        reached,
+        refused,
+        failed,
+        late: None,
+        overtaken: None,
+        unfollowed,
+        unheard,
+        in_this_order: false,
+    }
 }

@@ -73,6 +73,14 @@ impl<'a> KnownEvents<'a> {
         })
     }
 
+    /// What coordinators wait for and nobody raises, where a name that one of them raises may be that with a slip.
+    pub fn waited_for_as(&self, raised: &str) -> Option<&'a str> {
+        let unheard =
+            self.waited_for.iter().filter(|event| !self.told.contains(*event) && !self.is_known(event.as_str()));
+        let near = nearest(raised, unheard.map(|event| event.as_str()))?;
+        is_slip(raised, near).then_some(near)
+    }
+
     /// That an event which `listed` transitions of a coordinator wait for is nearly one that there is.
     pub fn near(&self, event: EventName, listed: usize) -> Option<Finding> {
         let text = event.as_str();
@@ -87,9 +95,7 @@ impl<'a> KnownEvents<'a> {
         if !is_heard && !self.confirms.contains(near) && !self.by_components.contains(near) {
             return None;
         }
-        // In a short name two letters make another word; and another number is another thing.
-        let slips = if text.chars().count() < 8 { 1 } else { 2 };
-        if strsim::damerau_levenshtein(text, near) > slips || without_numbers(text) == without_numbers(near) {
+        if !is_slip(text, near) {
             return None;
         }
         let by = match (self.raised.contains(near), self.by_components.contains(near)) {
@@ -100,6 +106,34 @@ impl<'a> KnownEvents<'a> {
         let finding = Finding::warning(COORD_NEAR_EVENT, format!("`{event}` is nearly `{near}`, which {by}"));
         Some(finding.help(format!("did you mean `{near}`? if not, a component or an operator must raise `{event}`")))
     }
+}
+
+/// Whether one name may be the other one with a slip of the finger, or with other capitals, and is not another word.
+fn is_slip(one: &str, other: &str) -> bool {
+    if one.eq_ignore_ascii_case(other) {
+        return true;
+    }
+    // In a short name two letters make another word; and another number is another thing.
+    let slips = if one.chars().count() < 8 { 1 } else { 2 };
+    strsim::damerau_levenshtein(one, other) <= slips
+        && without_numbers(one) != without_numbers(other)
+        && !are_two_words(one, other)
+}
+
+/// Whether two names differ in one word of them alone, and mean another thing there: `e_limit_x` and `e_limit_y`, what is to be done and that it
+/// has been (`e_close`, `e_closed`), something and its contrary (`e_locked`, `e_unlocked`).
+fn are_two_words(one: &str, other: &str) -> bool {
+    let parts = |name| str::split(name, ['_', '.', '-']);
+    if parts(one).count() != parts(other).count() {
+        return false;
+    }
+    let mut differ = parts(one).zip(parts(other)).filter(|(one, other)| one != other);
+    let (Some((one, other)), None) = (differ.next(), differ.next()) else { return false };
+    let (short, long) = if one.len() < other.len() { (one, other) } else { (other, one) };
+    let is_letter = |word: &str| word.chars().count() == 1;
+    let ends = ["d", "ed", "ing"].iter().any(|end| long.strip_suffix(end) == Some(short));
+    let begins = ["un", "re", "de"].iter().any(|start| long.strip_prefix(start) == Some(short));
+    is_letter(short) && is_letter(long) || short.len() > 2 && (ends || begins)
 }
 
 /// A name with the same in place of every number.

@@ -6,7 +6,7 @@ use super::state::{Next, ProductState};
 use super::timers::Timer;
 use crate::model::{EventName, Findings};
 use crate::stack::Request;
-use crate::statechart::NodeId;
+use crate::statechart::{EventId, NodeId};
 use std::time::Duration;
 
 /// A way: states with what leads to them.
@@ -23,6 +23,8 @@ pub struct Way {
     pub overtaken: Option<(Timer, Timer)>,
     /// It does not arrive as far as was looked: there are too many ways.
     pub unfollowed: bool,
+    /// It does not arrive, and neither this coordinator nor anybody whom it has to do with waits for what comes first.
+    pub unheard: Option<usize>,
     /// It does not arrive, and would in another order of answers and of what coordinators tell each other.
     pub in_this_order: bool,
 }
@@ -37,6 +39,9 @@ pub struct Tried {
     pub stopping: bool,
     /// So much time there is.
     pub within: Duration,
+    /// Coordinators for which no operator raises anything: neither they nor those whom they have to do with hear what it begins with, so
+    /// nobody knows to.
+    pub unreached: Vec<usize>,
 }
 
 impl Way {
@@ -47,6 +52,25 @@ impl Way {
 }
 
 impl Tried {
+    /// The same from that state on, to that goal. Who has nothing to do with those that hear what it begins with has to be led there by itself,
+    /// as where it is alone.
+    pub(super) fn from(self, product: &mut Product<'_>, state: &ProductState, goal: Goal) -> Self {
+        let groups = product.groups.clone();
+        let mut unreached = Vec::new();
+        for group in groups.iter().filter(|_| groups.len() > 1) {
+            if !group.iter().any(|at| product.members[*at].takes(state.leaves[*at], self.first)) {
+                unreached.extend(group.iter().copied().filter(|at| !product.are_in(state, goal, Some(&[*at]))));
+            }
+        }
+        Self { unreached, ..self }
+    }
+
+    /// Whether an operator would raise an event for some for whom nobody does.
+    pub(super) fn is_for_unreached(&self, product: &Product<'_>, name: EventName) -> bool {
+        let hears = |at: &usize| product.members[*at].chart.event(name) != EventId::OTHER;
+        !product.is_told_by_child(name) && self.unreached.iter().any(hears)
+    }
+
     /// The first of these moves after which a bring-up has failed, though every request is answered *ok*: by which
     /// coordinator, and its place.
     pub(super) fn fails(&self, product: &Product<'_>, moves: &[Next]) -> Option<(usize, usize)> {

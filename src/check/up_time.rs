@@ -12,14 +12,13 @@ use crate::system::{System, View};
 use rustc_hash::FxHashSet;
 
 /// Where one of these cut something off, what is asked for there may be missing.
-const CUTS: [Bound; 7] =
-    [Bound::Budget, Bound::Memory, Bound::Interrupted, Bound::Entered, Bound::Piled, Bound::Inbox, Bound::Forks];
+const CUTS: [Bound; 3] = [Bound::Piled, Bound::Inbox, Bound::Forks];
 
 impl Graph<'_, '_> {
     /// Those of these in-ports that are there while the deployment is up, and that nothing drives in any state then. None where not
     /// all of it was followed, or it never is up.
     pub(super) fn undriven_while_up(&self, ports: &[MemberRef]) -> Option<FxHashSet<MemberRef>> {
-        let whole = !CUTS.iter().any(|bound| self.bounds.contains_key(bound));
+        let whole = !self.is_cut_off() && !CUTS.iter().any(|bound| self.bounds.contains_key(bound));
         if !whole || self.product.others || !self.product.deployment.subsystems.is_empty() {
             return None;
         }

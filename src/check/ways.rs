@@ -135,6 +135,20 @@ fn stops(
             Finding::error(code, message).also(leaf, "comes here, even if every request succeeds")
         }
         (None, None) => {
+            if let Some(number) = way.unheard {
+                let event = if code == DEPLOY_NEVER_UP { deployment.deploy.event } else { deployment.shutdown.event };
+                let (member, leaf) = (&product.members[number], way.end().leaves[number]);
+                let (name, fqn) = (member.name, member.chart.fqn(leaf));
+                let message = format!("{what} does not begin for `{name}`: it does not wait for `{event}` in `{fqn}`");
+                let nobody = "nor does anybody who tells it anything";
+                return Finding::error(code, message)
+                    .also(member.chart.origin(leaf), nobody)
+                    .help(format!(
+                        "add a transition for `{event}` there, or let a coordinator that waits for it tell `{name}`"
+                    ))
+                    .at(deployment.key_origin(key))
+                    .path(key);
+            }
             let goals: Vec<String> = deployment.coordinators.iter().map(|c| format!("`{}`", goal(c))).collect();
             let stops = if rests { "stops at" } else { "goes round for ever at" };
             let message = format!("{what} {stops} `{at}` and never reaches {}", goals.join(", "));

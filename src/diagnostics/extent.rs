@@ -29,22 +29,18 @@ pub fn balanced(text: &str, span: Range<usize>) -> Range<usize> {
     span.start..end.max(span.end)
 }
 
-/// The `nth` name `word` in a range; the last one when there are fewer.
-pub fn find_name(text: &str, range: Range<usize>, word: &str, nth: usize) -> Option<Range<usize>> {
-    let bytes = text.as_bytes().get(..range.end)?;
+/// Every name `word` in a range.
+pub fn names<'t>(text: &'t str, range: Range<usize>, word: &'t str) -> impl Iterator<Item = Range<usize>> + 't {
+    let bytes = text.as_bytes().get(..range.end).unwrap_or_default();
     let mut at = range.start;
-    let (mut found, mut count) = (None, 0);
-    while let Some((token, kind)) = next_token(bytes, at) {
-        if kind == LuaToken::Name && &bytes[token.clone()] == word.as_bytes() {
-            found = Some(token.clone());
-            if count == nth {
-                break;
-            }
-            count += 1;
-        }
+    std::iter::from_fn(move || {
+        let (token, kind) = next_token(bytes, at)?;
         at = token.end;
-    }
-    found.filter(|span| text.get(span.clone()).is_some())
+        Some((token, kind))
+    })
+    .filter(move |(token, kind)| *kind == LuaToken::Name && &bytes[token.clone()] == word.as_bytes())
+    .filter(move |(token, _)| text.get(token.clone()).is_some())
+    .map(|(token, _)| token)
 }
 
 /// The first token in a range that is `word`: a name, or a string with that content; else one in which it stands as a word.

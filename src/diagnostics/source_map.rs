@@ -34,6 +34,8 @@ pub struct SourceFile {
     pub language: Language,
     /// Byte offsets at which lines begin.
     line_starts: Vec<u32>,
+    /// Every character is one byte.
+    is_ascii: bool,
     /// Lines of the whole text that stand before this one, when it is an excerpt.
     pub skipped: u32,
 }
@@ -120,6 +122,8 @@ struct LargeElements {
     bytes: usize,
     /// What was found.
     found: FxHashMap<u32, Location>,
+    /// The names of calls on large lines, by where these begin.
+    names: FxHashMap<(FileId, usize, &'static str), Vec<Range<usize>>>,
 }
 
 /// What a text is in a finding about a file of that language: the examples in it, which stand between backticks, are written as Lua has them.
@@ -147,7 +151,7 @@ impl SourceMap {
     pub fn told<'t>(&self, at: Origin, text: &'t str) -> Cow<'t, str> {
         let lua = || self.files.iter().any(|file| file.language == Language::Lua);
         let language = || {
-            let (file, _) = self.base(at)?;
+            let file = self.file_of(at)?;
             let language = self.file(file).language;
             (!(language == Language::Lua || file == FileId(0) && lua())).then_some(language)
         };
@@ -164,7 +168,8 @@ impl SourceMap {
         let after_breaks = breaks.map(|(i, _)| u32::try_from(i + 1).unwrap_or(u32::MAX));
         let line_starts = std::iter::once(0).chain(after_breaks).collect();
         let id = FileId(u32::try_from(self.files.len()).unwrap_or(u32::MAX));
-        self.files.push(SourceFile { name: name.into(), text, language, line_starts, skipped: 0 });
+        let is_ascii = text.is_ascii();
+        self.files.push(SourceFile { name: name.into(), text, language, line_starts, is_ascii, skipped: 0 });
         id
     }
 
@@ -232,6 +237,25 @@ impl SourceMap {
     /// Whether a place is known exactly, without looking for its text.
     pub fn is_exact(&self, origin: Origin) -> bool {
         matches!(self.places.get(origin.0 as usize), Some(TextPlace::Exact { .. }))
+    }
+
+    /// The file in which an origin stands, without looking where.
+    pub fn file_of(&self, origin: Origin) -> Option<FileId> {
+        let mut at = origin;
+        loop {
+            return match self.places.get(at.0 as usize)? {
+                TextPlace::Within { parent, .. } => {
+                    at = *parent;
+                    continue;
+                }
+                TextPlace::Nowhere => None,
+                TextPlace::File(file)
+                | TextPlace::Line { file, .. }
+                | TextPlace::Exact { file, .. }
+                | TextPlace::Call { file, .. }
+                | TextPlace::Read { file, .. } => Some(*file),
+            };
+        }
     }
 
     /// The bytes of the whole element at `origin`, as far as they are known: of a call in Lua up to its closing bracket.
@@ -355,7 +379,8 @@ impl SourceMap {
         let source = self.file(file);
         let line = source.line_of(span.start);
         let start = source.line(line).start;
-        let column = source.text.get(start..span.start).map_or(0, |t| t.chars().count());
+        let column =
+            source.text.get(start..span.start).map_or(0, |t| if source.is_ascii { t.len() } else { t.chars().count() });
         Location { file, line, column: u32::try_from(column).unwrap_or(u32::MAX).saturating_add(1), span }
     }
 
@@ -368,6 +393,9 @@ impl SourceMap {
                 let source = self.file(*file);
                 let line = source.line(*line);
                 let offset = |from: usize, chars: u32| {
+                    if source.is_ascii {
+                        return from.saturating_add(chars as usize).min(source.text.len());
+                    }
                     source.text[from..].char_indices().nth(chars as usize).map_or(source.text.len(), |(i, _)| from + i)
                 };
                 let start = offset(line.start, *column);
@@ -389,13 +417,27 @@ impl SourceMap {
             TextPlace::Call { file, line, nth, word } => {
                 let source = self.file(*file);
                 let line = source.line(*line);
-                let found = extent::find_name(&source.text, line.clone(), word, *nth as usize).unwrap_or_else(|| {
+                let found = self.nth_name(*file, line.clone(), word, *nth as usize).unwrap_or_else(|| {
                     let indent = source.text[line.clone()].len() - source.text[line.clone()].trim_start().len();
                     line.start + indent..line.end
                 });
                 (*file, found)
             }
         })
+    }
+
+    /// The `nth` name `word` on a line, or the last one where there are fewer. Of a large line all are looked for at once.
+    fn nth_name(&self, file: FileId, line: Range<usize>, word: &'static str, nth: usize) -> Option<Range<usize>> {
+        let text = &self.file(file).text;
+        if line.len() <= limits::PLACE_LARGE {
+            let mut last = None;
+            let mut names = extent::names(text, line, word).inspect(|name| last = Some(name.clone()));
+            return names.nth(nth).or(last);
+        }
+        let mut large = self.large();
+        let names = large.names.entry((file, line.start, word));
+        let names = names.or_insert_with(|| extent::names(text, line, word).collect());
+        names.get(nth).or(names.last()).cloned()
     }
 
     /// The bytes in which parts of the element at `origin` are looked for.

@@ -155,7 +155,7 @@ impl Cx {
     }
 
     fn language(&self, origin: Origin) -> Option<Language> {
-        self.sources.extent(origin).map(|(file, _)| self.sources.file(file).language)
+        self.sources.file_of(origin).map(|file| self.sources.file(file).language)
     }
 
     /// Reports that a node is not of the kind wanted; `example` is a line as it should be.

@@ -48,12 +48,9 @@ pub const CHECK_PROBED: usize = 10_000;
 /// Transitions that are followed to look for that.
 pub const CHECK_PROBE: usize = 50_000;
 
-/// Transitions on which no undo fails from which on `check` follows only one batch of a coordinator at a time behind an undo
-/// that fails, and says so, where following all there is behind one was too much for the budget.
+/// Transitions on which no undo fails from which on `check` at first follows only one batch of a coordinator at a time behind an undo
+/// that fails, and says so where following all there is behind one is too much for the budget.
 pub const CHECK_LEAN: usize = 5_000;
-
-/// Transitions up to which, where it was so for another reason, all is followed behind one after all.
-pub const CHECK_BEHIND: usize = 100_000;
 
 /// Configurations whose frames may be left by undos that failed, from which on that is known of one at a time: of fewer there are no more
 /// subsets than that needs states.

@@ -374,6 +374,12 @@ impl Hub {
         self.lock().log.last(last)
     }
 
+    /// The whole log, oldest first; and how many entries it no longer has, with the time of the newest of these.
+    pub fn whole_log(&self) -> (Vec<Arc<LogEntry>>, Option<(u64, f64)>) {
+        let state = self.lock();
+        (state.log.last(limits::LOG_ENTRIES), state.log.displaced())
+    }
+
     /// The active states, root to leaf, as last published; of several coordinators those of each, with its name before
     /// (`arm:root.on`).
     pub fn active(&self) -> Vec<String> {

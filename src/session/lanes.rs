@@ -11,19 +11,24 @@ pub struct Lanes<T> {
     most: usize,
     most_reports: usize,
     count: u64,
+    /// The newest that was displaced.
+    displaced: Option<(u64, T)>,
 }
 
 impl<T> Lanes<T> {
     /// An empty one with room for `most` things, and beside them for `most_reports` reports of components.
     pub fn new(most: usize, most_reports: usize) -> Self {
-        Self { own: VecDeque::new(), reports: VecDeque::new(), most, most_reports, count: 0 }
+        Self { own: VecDeque::new(), reports: VecDeque::new(), most, most_reports, count: 0, displaced: None }
     }
 
     /// Adds something; answers its number, from 1.
     pub fn push(&mut self, what: T, is_report: bool) -> u64 {
         let (lane, most) = if is_report { (&mut self.reports, self.most_reports) } else { (&mut self.own, self.most) };
         if lane.len() >= most {
-            lane.pop_front();
+            let oldest = lane.pop_front();
+            if oldest.as_ref().map(|(number, _)| number) > self.displaced.as_ref().map(|(number, _)| number) {
+                self.displaced = oldest;
+            }
         }
         self.count += 1;
         lane.push_back((self.count, what));
@@ -33,6 +38,12 @@ impl<T> Lanes<T> {
     /// How many things were added so far.
     pub fn count(&self) -> u64 {
         self.count
+    }
+
+    /// How many were displaced, and the newest of them.
+    pub fn displaced(&self) -> Option<(u64, &T)> {
+        let remembered = self.own.len() + self.reports.len();
+        self.displaced.as_ref().map(|(_, what)| (self.count - remembered as u64, what))
     }
 
     /// All that is remembered with its numbers, oldest first.
@@ -69,5 +80,7 @@ mod tests {
         assert_eq!(all, [5, 7, 8, 9, 10]);
         assert_eq!(lanes.newest(2).copied().collect::<Vec<_>>(), [9, 10]);
         assert_eq!(lanes.count(), 10);
+        assert_eq!(lanes.displaced(), Some((5, &6)), "the newest of five");
+        assert_eq!(Lanes::<u8>::new(1, 1).displaced(), None);
     }
 }

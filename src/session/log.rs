@@ -225,6 +225,11 @@ impl Log {
         self.0.push(entry, is_report);
     }
 
+    /// How many entries it no longer has, and when the newest of them was written.
+    pub fn displaced(&self) -> Option<(u64, f64)> {
+        self.0.displaced().map(|(entries, newest)| (entries, newest.at))
+    }
+
     /// The newest `last` entries, oldest first.
     pub fn last(&self, last: usize) -> Vec<Arc<LogEntry>> {
         self.0.newest(last).cloned().collect()

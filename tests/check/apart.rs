@@ -73,6 +73,38 @@ fn who_waits_where_nobody_leads_it_down_is_told_beside_others_too() {
     }
 }
 
+/// What begins and ends the deployment is to be heard by each that has nothing to do with the others, as if it were alone: that another one
+/// hears it leads it nowhere.
+#[test]
+fn that_another_one_hears_it_leads_nobody_down() {
+    let of = |up: &str, down: &str| {
+        format!(
+            "idle = state {{}}, up = state {{}}, trans {{ src = 'initial', tgt = 'idle' }},
+             trans {{ src = 'idle', tgt = 'up', events = {{ '{up}' }} }},
+             trans {{ src = 'up', tgt = 'idle', events = {{ '{down}' }} }},"
+        )
+    };
+    let (hears, tells) = (of("e_start", "e_shutdown"), of("e_start", "e_shutdown', 'e_lost"));
+    // What it waits for elsewhere does not help where it is up.
+    let elsewhere = "odd = state {}, trans { src = 'odd', tgt = 'idle', events = { 'e_shutdown' } },
+        trans { src = 'up', tgt = 'odd', events = { 'e_odd' } },";
+    for (b, code, at) in [
+        (of("e_start", "e_off"), codes::DEPLOY_NEVER_DOWN, "`root.up`"),
+        (of("e_start", "e_off") + elsewhere, codes::DEPLOY_NEVER_DOWN, "`root.up`"),
+        (of("e_on", "e_shutdown"), codes::DEPLOY_NEVER_UP, "`root.idle`"),
+    ] {
+        let small = Small::several("", &[("a", &hears), ("b", &b)], "");
+        let told = followed(&small, false).findings;
+        let told: Vec<_> = told.iter().filter(|f| f.code == code).map(|f| f.message.as_str()).collect();
+        assert!(told.len() == 1 && told[0].contains("does not begin for `b`") && told[0].contains(at), "{told:?}");
+    }
+    // Who is told by one that hears it is led by that.
+    let told = tells.replace("up = state {}", "up = state { exit = 'e_b_off' }");
+    let small = Small::several("", &[("a", &told), ("b", &of("e_start", "e_b_off"))], "emits: [e_b_off]\n");
+    let report = followed(&small, false);
+    assert!(!report.findings.iter().any(|f| f.severity > Severity::Info), "{:#?}", report.findings);
+}
+
 /// Three cost three times what one costs, and not the product.
 #[test]
 fn a_safe_configuration_joins_nobody() {

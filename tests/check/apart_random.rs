@@ -249,7 +249,7 @@ fn told(report: &Report) -> BTreeSet<(Code, String)> {
     // That nothing leads on in one is, of both together, that no way leads down.
     let one = |finding: &Finding| match finding.code {
         codes::COORD_STUCK | codes::COORD_NO_WAY_DOWN => (codes::COORD_NO_WAY_DOWN, String::new()),
-        codes::COORD_LEFTOVERS => (finding.code, String::new()),
+        codes::COORD_LEFTOVERS | codes::DEPLOY_NEVER_UP | codes::DEPLOY_NEVER_DOWN => (finding.code, String::new()),
         code => (code, finding.message.clone()),
     };
     worth.map(one).collect()

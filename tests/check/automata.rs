@@ -129,3 +129,29 @@ fn a_subsystem_that_goes_on_by_itself_when_it_is_down_is_not_called_sound() {
     );
     assert!(!report.explored.complete);
 }
+
+/// It is down where nobody has led its subsystem down, and the event that ends the deployment comes there: nothing does then.
+#[test]
+fn a_parent_that_is_down_while_its_subsystem_is_up_is_warned_of() {
+    let waits = "  trans { src = 'on', tgt = 'lowering', events = { 'e_shutdown', 'left/e_leaving' } },";
+    let judged = |more: &str| {
+        let with = format!("{waits}\n{more}");
+        let loaded = load(&files(&[("solo.lua", waits, &with)]), "solo.yaml", &[]);
+        let deployment = loaded.deployment.unwrap_or_else(|| panic!("{:#?}", loaded.findings));
+        let catalogue = catalogue(&deployment);
+        let report = check::run(deployment, &catalogue);
+        (with_code(&report.findings), report.verdict)
+    };
+    fn with_code(findings: &[Finding]) -> Vec<String> {
+        with(findings, "coord::no_way_down", Severity::Warning)
+    }
+    assert_eq!(judged("").0, Vec::<String>::new());
+    let (told, verdict) = judged("trans { src = 'on', tgt = 'idle', events = { 'e_drop' } },");
+    assert_eq!(verdict, CheckVerdict::Warnings);
+    assert!(told.len() == 1 && told[0].contains("left"), "{told:?}");
+    // Led down by the same event, it comes down by itself.
+    let led = "dropping = state { entry = { 'left/e_shutdown', 'left/e_released' } },
+  trans { src = 'on', tgt = 'dropping', events = { 'e_drop' } }, trans { src = 'dropping', tgt = 'idle', events = { 'e_go' } },";
+    let (told, _) = judged(led);
+    assert!(!told.iter().any(|told| told.contains("`root.idle`")), "{told:?}");
+}

@@ -17,6 +17,7 @@ mod automata;
 mod beside;
 mod circles;
 mod composed;
+mod deeper;
 mod demands;
 mod exclusive;
 mod flat_coupling;

@@ -56,6 +56,17 @@ fn an_event_that_is_refused_while_stopping_is_no_way_down() {
     }
 }
 
+/// That something fails nobody can promise, whether or not it is said which events are those of safety.
+#[test]
+fn a_failure_is_no_way_down() {
+    for keys in ["", "safety: [e_estop]\n", "safety: [e_estop, a.faulted]\n"] {
+        let small = Small::new(BASE, &asking("'a.faulted'"), keys);
+        let said = Said(small.demo.run(&["check", "small.yaml", "--json"]).json());
+        let finding = only(&said, "coord::no_way_down");
+        assert!(finding["message"].as_str().unwrap().contains("only where something fails"), "{keys} {finding:#}");
+    }
+}
+
 /// What a simulated component reports half a second after a step.
 fn reports(after: &str) -> String {
     format!(

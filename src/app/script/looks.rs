@@ -2,10 +2,10 @@
 
 use super::options::OptionFields;
 use super::{SharedHost, error, session, values};
-use crate::limits;
 use crate::model::finding::did_you_mean;
 use crate::model::{ComponentName, ComponentSnapshot, Ident, MemberRef, RunState, Snapshot};
 use mlua::{Lua, Table, Value as LuaValue};
+use serde_json::{Value as Json, json};
 
 /// The system, as far as anybody knows it.
 pub(super) fn system(host: &SharedHost) -> mlua::Result<Snapshot> {
@@ -78,15 +78,17 @@ pub(super) fn port(host: &SharedHost, lua: &Lua, text: &str) -> mlua::Result<Lua
 }
 
 /// What happened in the deployment, oldest first, as `davit log --json` prints it: from the time `since` on (seconds of the clock), as far
-/// back as the log of a session reaches.
+/// back as the log of a session reaches. Where that is not so far the first one says so, as it does to who follows the log.
 pub(super) fn log(host: &SharedHost, lua: &Lua, options: Option<Table>) -> mlua::Result<LuaValue> {
     let since = OptionFields::of("log", options, &["since"])?.number("since")?.unwrap_or(f64::NEG_INFINITY);
     if since.is_nan() {
         return Err(error("`log`: `since` is not a number"));
     }
-    let mut entries = session(host)?.hub().log(limits::LOG_ENTRIES);
+    let (mut entries, displaced) = session(host)?.hub().whole_log();
     // In the order of their times: what comes later is not earlier.
     entries.drain(..entries.partition_point(|entry| entry.at < since));
-    let entries: Vec<_> = entries.iter().map(|entry| &**entry).collect();
+    let missed = displaced.filter(|(_, at)| *at >= since);
+    let missed = missed.map(|(entries, at)| json!({ "at": at, "what": "missed", "entries": entries }));
+    let entries: Vec<Json> = missed.into_iter().chain(entries.iter().map(|entry| json!(&**entry))).collect();
     values::to_lua(lua, &entries)
 }
