@@ -226,7 +226,7 @@ pub const TEXT_NODES: usize = 1_000_000;
 pub const SLIP_BYTES: usize = 64 * 1024 * 1024;
 
 /// Bytes of large elements ([`PLACE_LARGE`]) in which the words are looked for that findings are about; past it a finding points at the
-/// element around them. A second or two, for files that mean harm.
+/// element around them. Some seconds, for files that mean harm.
 pub const PLACE_BYTES: usize = 32 * 1024 * 1024;
 
 /// Bytes of an element that is large: one that people write has some hundreds.

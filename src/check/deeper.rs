@@ -1,6 +1,7 @@
 //! Following anew with more of what makes many times as many states, where it was little. Where that turns out to be too much, or it has to
 //! end, what is known is what was followed to its end before.
 
+use super::behind::Behind;
 use super::bound::Bound;
 use super::explore::{Graph, Reached};
 use super::product::Product;
@@ -22,17 +23,33 @@ pub(super) enum More {
 }
 
 /// What has been tried.
-#[derive(Default)]
 pub(super) struct Deeper {
-    /// What is tried now, and what was reached to its end without it.
-    trying: Option<(More, Reached)>,
+    /// What is tried now, and what was reached to its end without it; none: nothing was yet.
+    trying: Option<(More, Option<Reached>)>,
     too_much: Vec<More>,
 }
 
 impl Deeper {
-    /// Where what was tried was not followed to its end: goes back to what was reached without it.
+    /// Begins with little behind undos that fail, unless there is nothing else to be looked at.
+    pub fn new(product: &mut Product<'_>) -> Self {
+        let is_alone = product.minds_stopping && !product.waits_for_others();
+        product.behind = if is_alone { Behind::AsItFits } else { Behind::Little };
+        Self { trying: is_alone.then_some((More::Behind, None)), too_much: Vec::new() }
+    }
+
+    /// Where what was tried was not followed to its end: goes back to what was reached without it. False: it is to be followed anew without it.
     pub fn goes_back(&mut self, graph: &mut Graph<'_, '_>) -> bool {
-        let Some((more, without)) = self.trying.take().filter(|_| graph.is_cut_off()) else { return false };
+        let Some((more, without)) = self.trying.take().filter(|_| graph.is_cut_off()) else { return true };
+        let Some(without) = without else {
+            let lean = |behind: Behind| graph.before_undo.is_some_and(|before| behind.is_lean(before));
+            // As much is followed without, or it has to end.
+            if !graph.is_used_up() || lean(graph.product.behind) || !lean(Behind::Little) {
+                return true;
+            }
+            graph.product.follow_more(more, false);
+            self.too_much.push(more);
+            return false;
+        };
         graph.product.follow_more(more, false);
         graph.reached = without;
         self.too_much.push(more);
@@ -60,7 +77,7 @@ impl Deeper {
         .find_map(|(more, wanted)| (wanted && !self.too_much.contains(&more)).then_some(more));
         let Some(more) = more else { return false };
         graph.product.follow_more(more, true);
-        self.trying = Some((more, std::mem::take(&mut graph.reached)));
+        self.trying = Some((more, Some(std::mem::take(&mut graph.reached))));
         true
     }
 }
@@ -69,7 +86,7 @@ impl Product<'_> {
     /// From now on more of it is followed, or as much as before.
     pub fn follow_more(&mut self, more: More, is_more: bool) {
         match more {
-            More::Behind => self.follows_behind = is_more,
+            More::Behind => self.behind = if is_more { Behind::All } else { Behind::Little },
             More::Waiting if is_more => self.most_waiting += 1,
             More::Waiting => self.most_waiting -= 1,
             More::Stopping => self.minds_stopping = is_more,

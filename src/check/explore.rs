@@ -345,8 +345,7 @@ impl Graph<'_, '_> {
 
     fn is_lean(&self, at: u32) -> bool {
         self.failed[at as usize] >= Failed::Undo
-            && !self.product.follows_behind
-            && self.before_undo.is_some_and(|before| before > limits::CHECK_LEAN)
+            && self.before_undo.is_some_and(|before| self.product.behind.is_lean(before))
     }
 
     /// What follows from a state: always the same.

@@ -11,6 +11,7 @@ mod aside;
 mod automaton;
 mod automaton_draft;
 mod bars;
+mod behind;
 mod belief;
 mod bound;
 mod children;

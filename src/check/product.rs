@@ -11,6 +11,7 @@
 //! inboxes are empty.
 
 use super::aside::Aside;
+use super::behind::Behind;
 use super::children::{Child, WatchedSubsystem};
 use super::coordinator::outside_events;
 use super::coupling;
@@ -70,9 +71,8 @@ pub struct Product<'a> {
     pub races: bool,
     /// Batches of one coordinator that may be unanswered when the next event comes.
     pub most_waiting: usize,
-    /// Behind an undo that fails all is followed, and not one batch of a coordinator at a time without races where much comes before one
-    /// fails ([`limits::CHECK_LEAN`]).
-    pub(super) follows_behind: bool,
+    /// How much is followed behind an undo that fails.
+    pub(super) behind: Behind,
     /// Configurations that may be lost, and whether they stand for something. Those that do not are lost where the platform is
     /// found to differ: followed where somebody listens.
     pub losable: Vec<(ConfigId, bool)>,
@@ -157,7 +157,7 @@ impl<'a> Product<'a> {
             forked: false,
             races: true,
             most_waiting: limits::CHECK_WAITING,
-            follows_behind: false,
+            behind: Behind::default(),
             losable,
             tells_all: false,
             minds_stopping,

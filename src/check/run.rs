@@ -204,12 +204,15 @@ fn follow(
             apart.stands_in(around);
         }
         let product = apart.as_mut().unwrap_or(&mut product);
-        let mut deeper = Deeper::default();
+        let mut deeper = Deeper::new(product);
         loop {
             product.follow_anew();
             product.effort = product.most_believed();
             let mut graph = explore(product);
-            if !deeper.goes_back(&mut graph) && graph.product.knows_children() && graph.is_used_up() {
+            if !deeper.goes_back(&mut graph) {
+                continue;
+            }
+            if graph.product.knows_children() && graph.is_used_up() {
                 // With all that is known of them there is too much of it.
                 graph.product.forget_children();
                 graph.product.follow_with(effort);

@@ -114,6 +114,23 @@ fn a_near_event_is_a_slip_where_it_is_near_enough_and_nobody_declares_it() {
         "one letter of what a parent raises"
     );
     assert_eq!(listens(&["e_5dof"], "accepts: [e_8dof]\n"), 0, "another number is another thing");
+    // One word of it is another one: what is to be done and what has been, something and its contrary, another axis.
+    for (heard, accepted, told) in [
+        ("e_released", "e_release", 0),
+        ("e_closing", "e_close", 1),
+        ("e_opened", "e_open", 0),
+        ("e_gate_unlocked", "e_gate_locked", 0),
+        ("e_limit_x", "e_limit_y", 0),
+        ("e_limit_x_hit", "e_limit_y_hit", 0),
+        ("e_EC_TIMEOUT", "e_ec_timeout", 1),
+        ("e_Reset", "e_reset", 1),
+        ("e_gate_lockd", "e_gate_locked", 1),
+        ("e_gate_unlocekd", "e_gate_unlocked", 1),
+    ] {
+        let more = format!("trans {{ src = \"up\", tgt = \"leaving\", events = {{ \"{heard}\", \"{accepted}\" }} }},");
+        let said = check(&more, &format!("accepts: [{accepted}]\n"));
+        assert_eq!(said.of("coord::near_event").len(), told, "{heard} beside {accepted}: {:#}", said.0);
+    }
 }
 
 #[test]

@@ -256,6 +256,24 @@ fn what_another_coordinator_tells_is_no_slip() {
     assert_eq!((of("'e_arm_off'"), of("")), (0, 1));
 }
 
+/// Where it is raised, too: what is waited for and nobody raises was meant.
+#[test]
+fn a_slip_in_what_is_raised_for_another_coordinator_names_what_is_waited_for() {
+    let tells =
+        by_base("up", "leaving", "trans { src = 'up', tgt = 'up', events = { 'e_a' }, effect = { 'e_arm_maed' } },");
+    let hears = "idle = state {}, up = state {}, trans { src = 'initial', tgt = 'idle' },
+        trans { src = 'idle', tgt = 'up', events = { 'e_start' } }, trans { src = 'up', tgt = 'idle', events = { 'e_shutdown' } },
+        trans { src = 'up', tgt = 'up', events = { 'e_arm_made' } },";
+    let help = |tells: &str| {
+        let said = Small::several(BASE, &[("one", tells), ("two", hears)], "").check();
+        let help = |f: &serde_json::Value| f["help"].as_str().unwrap().to_owned();
+        said.of("coord::unknown_request").into_iter().map(help).collect::<Vec<_>>()
+    };
+    assert_eq!(help(&tells), ["did you mean `e_arm_made`, which is waited for and nobody raises?"]);
+    let told = help(&tells.replace("e_arm_maed", "e_something_else"));
+    assert!(told.len() == 1 && told[0].ends_with("is listed under `emits`"), "{told:?}");
+}
+
 #[test]
 fn a_slip_in_what_another_coordinator_tells_is_one() {
     let tells =

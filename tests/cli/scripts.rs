@@ -77,6 +77,25 @@ fn the_log_is_what_davit_log_prints_from_a_time_on() {
     assert!(refused("shutdown() log()").contains("nothing is deployed"));
 }
 
+/// What it no longer has is said, and not passed over.
+#[test]
+fn a_log_that_does_not_reach_back_so_far_says_so() {
+    let ran = hello(
+        "local first = now()
+         wait(0.01)
+         for i = 1, 900 do raise('e_loud') wait_answer('loud.ok', 1) raise('e_quiet') wait(0.01) end
+         local all = log()
+         assert(all[1].what == 'missed' and all[1].entries > 1000, all[1].what)
+         for i = 2, #all do assert(all[i].what ~= 'missed' and all[1].at <= all[i].at, 'what is left is newer') end
+         assert(log{ since = first }[1].what == 'missed')
+         local left = log{ since = all[1].at + 0.001 }
+         assert(#left > 3000 and left[1].what ~= 'missed', #left)
+         shutdown()",
+        &["--quiet"],
+    );
+    assert_eq!(ran.code, 0, "{}{}", ran.out, ran.err);
+}
+
 #[test]
 fn an_in_port_that_nothing_drives_is_what_was_written() {
     let demo = Demo::new();

@@ -256,6 +256,24 @@ fn mistakes_in_something_huge_are_not_looked_for_for_ever() {
     assert!(columns[120..].iter().all(|column| *column == 1), "{:?}", &columns[120..]);
 }
 
+/// Mistakes in calls on one line are each found where they stand, and cost no more the further to the right that is.
+#[test]
+fn mistakes_in_calls_on_one_huge_line_are_found_where_they_stand() {
+    let call = "property_set(5, 1), ";
+    let begins = "ConfiguratorConf { a = Configuration { ";
+    let loaded = with_configurations(&format!("{begins}{} }} }}", call.repeat(60_000)));
+    let all = davit::diagnostics::to_json(&loaded.findings, &loaded.sources);
+    let columns: Vec<usize> = all.as_array().unwrap().iter().map(|f| f["column"].as_u64().unwrap() as usize).collect();
+    assert_eq!(columns.len(), davit::limits::FINDINGS);
+    let wanted: Vec<usize> =
+        (0..columns.len()).map(|nth| begins.len() + nth * call.len() + "property_set(".len() + 1).collect();
+    let found: Vec<usize> = columns.iter().take(80).copied().collect();
+    assert_eq!(found, wanted[..80], "exactly at first");
+    let begin = |column: &usize| (column - 1 - begins.len()) % call.len();
+    assert!(columns.iter().all(|column| [0, "property_set(".len()].contains(&begin(column))), "{columns:?}");
+    assert!(columns.is_sorted(), "each in its own call");
+}
+
 #[test]
 fn duplicates_are_found() {
     let twice = "ConfiguratorConf { a = Configuration { }, a = Configuration { destroy('A') } }";
