@@ -1,7 +1,7 @@
 //! From files to a checked deployment.
 
 use super::platforms::{Extensions, PlatformMaker};
-use crate::check::{self, Report};
+use crate::check::{self, Effort, Far, Halt, Report};
 use crate::diagnostics::SourceMap;
 use crate::lang::{self, LoadOptions, Loaded};
 use crate::libraries::monitors;
@@ -126,24 +126,27 @@ fn read_loaded(loaded: Loaded, extensions: &Extensions, other: Option<Ident>) ->
 /// # Errors
 /// [`Refused`] with everything that reading and checking found.
 pub fn check(read: Read) -> Result<Checked, Refused> {
-    checked(read, |report| report.checked.take())
+    checked(read, &|| true, |report| report.checked.take())
 }
 
-/// The same for a deployment that is to go a way that `davit check` found, on the simulated platform: what was found by
-/// following its coordinators does not refuse it.
+/// The same as long as somebody wants it: asked every few milliseconds. Where nobody does any more it ends, and says nothing of the deployment.
+/// One `to_replay` is to go a way that `davit check` found, on the simulated platform: what was found by following its coordinators does not
+/// refuse it.
 ///
 /// # Errors
-/// [`Refused`] with all other findings.
-pub fn check_to_replay(read: Read) -> Result<Checked, Refused> {
-    checked(read, |report| report.replayed.take())
+/// [`Refused`] with all findings.
+pub fn check_while(read: Read, to_replay: bool, is_wanted: &(dyn Fn() -> bool + Sync)) -> Result<Checked, Refused> {
+    checked(read, is_wanted, |report| if to_replay { report.replayed.take() } else { report.checked.take() })
 }
 
 fn checked(
     read: Read,
+    is_wanted: &(dyn Fn() -> bool + Sync),
     take: impl FnOnce(&mut Report) -> Option<check::Accepted<Deployment>>,
 ) -> Result<Checked, Refused> {
     let Read { deployment, catalogue, libraries, platform, sources, findings: before } = read;
-    let mut report = check::run(deployment, &catalogue);
+    let goes_on = |_: Far| if is_wanted() { Ok(()) } else { Err(Halt::Interrupted) };
+    let mut report = check::run_with(deployment, &catalogue, Effort { goes_on: &goes_on, ..Effort::default() });
     let taken = take(&mut report);
     let mut findings = report.findings;
     findings.extend(before);

@@ -7,7 +7,7 @@ mod platforms;
 pub mod script;
 mod start;
 
-pub use load::{Checked, Read, Refused, check, check_to_replay, read, read_but_for, read_for};
+pub use load::{Checked, Read, Refused, check, check_while, read, read_but_for, read_for};
 pub use planned::{Application, drive, plan, plan_way, wrong_in_others};
 pub use platforms::{Extensions, Making, PlatformMaker};
 pub use start::{StartError, faults, reactions, start, start_on};

@@ -84,15 +84,20 @@ impl Product<'_> {
         }
     }
 
+    /// Whether a monitor tells it, or a component of the simulated platform.
+    pub(super) fn is_reported(&self, name: EventName) -> bool {
+        let deployment = self.deployment;
+        let reacts = deployment.kind.imitates && deployment.reactions.iter().any(|reaction| reaction.raise == name);
+        reacts || deployment.monitors.iter().flat_map(Monitor::events).any(|event| event == name)
+    }
+
     fn may_raise(&self, name: EventName) -> Raises {
         let deployment = self.deployment;
         let simulated = deployment.kind.imitates;
-        let reacts = simulated && deployment.reactions.iter().any(|reaction| reaction.raise == name);
-        let watched = || deployment.monitors.iter().flat_map(Monitor::events).any(|event| event == name);
         // What a subsystem tells nobody can refuse. That something fails nobody can promise, though they may tell it by hand.
         if self.is_told_by_child(name) || deployment.stays_open(name.as_str()) && !fails(name) {
             Raises::Somebody
-        } else if reacts || fails(name) || watched() {
+        } else if fails(name) || self.is_reported(name) {
             Raises::Sometimes
         } else if simulated {
             // There components raise what `simulated: { reactions }` says, and nothing else.

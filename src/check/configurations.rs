@@ -7,13 +7,16 @@
 
 use super::universe::{Creation, Creations, Universe};
 use crate::limits;
+use crate::model::codes::CHANGE_TWICE;
 use crate::model::finding::nearest;
 use crate::model::{
-    Change, ChangeKind, ComponentName, ConfigId, Configuration, Deployment, Findings, Origin, Target, TypeName,
+    Change, ChangeKind, ComponentName, ConfigId, Configuration, Deployment, Finding, Findings, Origin, Severity,
+    Target, TypeName,
 };
-use crate::plan::PlanContext;
 use crate::plan::meant::Meant;
+use crate::plan::{ConflictSubject, PlanContext};
 use crate::system::{Picture, Violation, either};
+use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
 
 /// What stands for all other components in a list of states.
@@ -22,7 +25,9 @@ const DEFAULT: &str = "_default";
 /// What is wrong with each configuration by itself.
 pub fn check(deployment: &Deployment, universe: &Universe) -> Findings {
     let all: Vec<ConfigId> = deployment.configurations.iter().map(|c| c.id).collect();
-    some(deployment, universe, &all)
+    let mut findings = some(deployment, universe, &all);
+    deployment.configurations.iter().for_each(|configuration| twice(configuration, &mut findings));
+    findings
 }
 
 /// What is wrong with these configurations by themselves.
@@ -32,6 +37,30 @@ pub fn some(deployment: &Deployment, universe: &Universe, ids: &[ConfigId]) -> F
         check.configuration(configuration);
     }
     check.findings
+}
+
+/// What stands in a configuration a second time is done once: of an operation that may not be what was meant.
+fn twice(configuration: &Configuration, findings: &mut Findings) {
+    let mut known: FxHashMap<ConflictSubject, &Change> = FxHashMap::default();
+    for (i, second) in configuration.changes.iter().enumerate() {
+        let first = *known.entry(ConflictSubject::of(&second.kind)).or_insert(second);
+        // Of others with one subject it is said that they clash.
+        if std::ptr::eq(first, second) || first.kind != second.kind {
+            continue;
+        }
+        let (severity, help) = match second.kind {
+            ChangeKind::OperationCall { .. } => {
+                (Severity::Warning, "to call it twice write two configurations, and apply them one after the other")
+            }
+            _ => (Severity::Info, "remove one of the two"),
+        };
+        let finding = Finding::new(severity, CHANGE_TWICE, format!("`{}` stands twice, and is done once", second.kind))
+            .at(second.origin)
+            .labelled("again")
+            .also(first.origin, "first here")
+            .help(help);
+        findings.push(finding.path(format!("configurations.{}.changes[{i}]", configuration.id)));
+    }
 }
 
 /// A component of a change, and one of the ways in which it may have been created.

@@ -195,6 +195,18 @@ fn heard(deployment: &Deployment, chart: &Chart, known: &KnownEvents<'_>, findin
                 findings.push(finding.at(at).labelled("waits for it"));
                 continue;
             }
+            if let Some(near) = paths::dotted(deployment, &text) {
+                let message = format!("`{event}` is no event: what a subsystem tells has its path before it");
+                let finding = Finding::error(COORD_UNKNOWN_ANSWER, message).at(at).labelled("waits for it");
+                findings.push(finding.help(format!("did you mean `{near}`?")));
+                continue;
+            }
+            if deployment.names_configuration(&text) {
+                let message = format!("`{event}` is a configuration, and no event: nobody raises it");
+                let finding = Finding::error(COORD_UNKNOWN_ANSWER, message).at(at).labelled("waits for it");
+                findings.push(finding.help(format!("did you mean `{event}.ok`, which answers it?")));
+                continue;
+            }
             if !deployment.looks_like_answer(&text) {
                 let near = known.near(event, listed(chart, *trigger));
                 findings.extend(near.map(|finding| finding.at(at).labelled("waits for it")));
@@ -222,15 +234,24 @@ fn heard(deployment: &Deployment, chart: &Chart, known: &KnownEvents<'_>, findin
             } else if Verdict::ENDINGS.iter().any(|s| s.trim_start_matches('.') == suffix.trim_start_matches('.')) {
                 let undo = text.contains(".undo") || text.ends_with(".undone");
                 let what = if undo && !bare { format!("{id}.undo") } else { id.to_owned() };
+                let asked = chart.raises().iter().find(|site| site.name.as_str() == what);
+                let (why, help) = match asked.and_then(|site| ask_of(deployment, site.name)) {
+                    Some(ask) => {
+                        let answers = ask.verdicts().iter().map(|verdict| format!("`{}`", verdict.event(ask)));
+                        let answers = answers.collect::<Vec<_>>().join(", ");
+                        (format!("`{what}` is not answered so"), format!("`{what}` is answered {answers}"))
+                    }
+                    None => (
+                        format!("the coordinator does not ask for `{what}`"),
+                        format!(
+                            "raise `{what}` where it is wanted, or leave the event out: answers go to whoever asked"
+                        ),
+                    ),
+                };
                 findings.push(
-                    Finding::warning(
-                        COORD_ANSWER_NEVER_COMES,
-                        format!("`{event}` never comes: the coordinator does not ask for `{what}`"),
-                    )
-                    .at(at)
-                    .help(format!(
-                        "raise `{what}` where it is wanted, or leave the event out: answers go to whoever asked"
-                    )),
+                    Finding::warning(COORD_ANSWER_NEVER_COMES, format!("`{event}` never comes: {why}"))
+                        .at(at)
+                        .help(help),
                 );
             } else {
                 findings.push(

@@ -80,6 +80,24 @@ impl Graph<'_, '_> {
         open.filter(|at| rests(at) && self.failed[*at as usize] <= Failed::Apply).collect()
     }
 
+    /// Where nobody heard the event that ends it, of what comes to rest there: the first on the shortest way.
+    fn unheard_before(&mut self, at: u32, comes_up: &[bool]) -> Option<u32> {
+        let state = |at: u32| &self.states[at as usize];
+        let mut unheard = Vec::new();
+        let (mut open, mut met) = (vec![at], FxHashSet::from_iter([at]));
+        while let Some(to) = open.pop() {
+            for number in self.incoming().of(to) {
+                let edge = &self.edges[*number as usize];
+                if edge.dropped() && comes_up[edge.from as usize] {
+                    unheard.push(edge.from);
+                } else if !state(edge.from).is_at_rest() && state(edge.from).stopping && met.insert(edge.from) {
+                    open.push(edge.from);
+                }
+            }
+        }
+        self.best_first(unheard).first().copied()
+    }
+
     /// That nobody hears the event that ends the deployment where a bring-up has failed, or is stopped; `told` is told already.
     pub(super) fn failing(&mut self, comes_up: &[bool], told: Option<u32>, found: &mut Traced) {
         let failed = self.failed_bring_ups(comes_up);
@@ -93,13 +111,16 @@ impl Graph<'_, '_> {
         let some: Vec<u32> = all.iter().copied().filter(|at| warned(self, *at)).collect();
         let severity = if some.is_empty() { Severity::Info } else { Severity::Warning };
         let Some(at) = self.best_first(if some.is_empty() { all } else { some }).first().copied() else { return };
-        let state = &self.states[at as usize];
-        if told.is_some_and(|told| self.states[told as usize].leaves == state.leaves) {
+        if told.is_some_and(|told| self.states[told as usize].leaves == self.states[at as usize].leaves) {
             return;
         }
+        let from = if is_listed(self, at) { at } else { self.unheard_before(at, comes_up).unwrap_or(at) };
+        let state = &self.states[at as usize];
         let deployment = self.product.deployment;
         let (event, place) = (deployment.shutdown.event, self.product.place(state));
         let by = self.product.failed_in(state).unwrap_or_default();
+        let unheard = self.product.place(&self.states[from as usize]);
+        let origin = |at: u32| self.product.members[by].chart.origin(self.states[at as usize].leaves[by]);
         let finding = match is_listed(self, at) {
             true => Finding::new(
                 severity,
@@ -110,19 +131,16 @@ impl Graph<'_, '_> {
             )
             .path("deploy.failed")
             .also(deployment.key_origin("deploy.failed"), "it means that the bring-up has failed"),
-            false => Finding::new(
-                severity,
-                COORD_NO_WAY_DOWN,
-                format!(
-                    "stopped before it is up, it rests in `{place}` where nobody has heard `{event}`: it is taken back without its \
-                     coordinator"
-                ),
-            )
-            .path("shutdown.event"),
+            false => {
+                let message = format!("nobody hears `{event}` in `{unheard}`, before it is up");
+                let rests = if unheard == place { "there".to_owned() } else { format!("in `{place}`") };
+                let message = format!("{message}; it rests {rests}, and is taken back without its coordinator");
+                let finding = Finding::new(severity, COORD_NO_WAY_DOWN, message).path("shutdown.event");
+                if unheard == place { finding } else { finding.also(origin(at), "it rests here") }
+            }
         };
-        let finding = finding
-            .at(self.product.members[by].chart.origin(state.leaves[by]))
-            .help(format!("add a transition on `{event}` that leads down from there"));
+        let finding =
+            finding.at(origin(from)).help(format!("add a transition on `{event}` that leads down from `{unheard}`"));
         let trace = self.trace(at);
         found.push((finding, trace));
     }

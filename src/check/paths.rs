@@ -9,6 +9,10 @@ use std::collections::BTreeSet;
 /// The finding of an event that is raised for a subsystem which does not take it, or is not there; none where the name has no path, or the
 /// deployment no subsystems.
 pub fn raised(deployment: &Deployment, name: EventName) -> Option<Finding> {
+    if let Some(near) = dotted(deployment, name.as_str()) {
+        let message = format!("`{name}` asks for nothing: what is raised for a subsystem has its path before it");
+        return Some(Finding::error(COORD_UNKNOWN_REQUEST, message).help(format!("did you mean `{near}`?")));
+    }
     let (path, own) = name.as_str().split_once('/')?;
     if deployment.subsystems.is_empty() {
         return None;
@@ -27,6 +31,12 @@ pub fn raised(deployment: &Deployment, name: EventName) -> Option<Finding> {
         None => format!("`{path}` accepts {list}; list `{own}` under `accepts` in its file if it is to take it"),
     };
     Some(Finding::error(COORD_UNKNOWN_REQUEST, message).also(subsystem.origin, "the subsystem").help(help))
+}
+
+/// What a name was meant to be that has a dot behind the name of a subsystem (`left.up`): `left/up`.
+pub fn dotted(deployment: &Deployment, name: &str) -> Option<String> {
+    let (path, own) = name.split_once('.').filter(|(path, own)| !path.contains('/') && !own.contains('/'))?;
+    named(deployment, path).map(|_| format!("{path}/{own}"))
 }
 
 /// Events with the path of no subsystem that transitions wait for.

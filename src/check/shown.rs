@@ -90,6 +90,7 @@ pub const READ: &[(&str, &[Code])] = &[
             CONF_HOLDS_UNSEEN,
             CONF_SAFE_LETS_GO,
             CONF_ALONE_IN_GROUP,
+            CHANGE_TWICE,
             DEPLOY_SAFETY_ANSWER,
             DEPLOY_UNKNOWN_CONFIGURATION,
             DEPLOY_UNKNOWN_STATE,

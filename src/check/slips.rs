@@ -63,10 +63,19 @@ impl<'a> KnownEvents<'a> {
             let message = format!("`{event}` is no time event: somebody must raise it under that very name");
             return Some(Finding::warning(COORD_NEAR_EVENT, message).help(format!("did you mean `{near}({inner}`?")));
         }
-        let component = event.strip_suffix(FAULTED)?;
         let changes = self.deployment.configurations.iter().flat_map(|configuration| &configuration.changes);
         let created: BTreeSet<&str> =
             changes.filter_map(|change| change.kind.makes()).map(|(component, ..)| component.as_str()).collect();
+        if let Some((component, word)) = event.rsplit_once('.').filter(|(component, _)| created.contains(component))
+            && format!(".{word}") != FAULTED
+            && is_slip(word, &FAULTED[1..])
+        {
+            let message = format!("`{event}` never comes: that `{component}` fails is told as `{component}{FAULTED}`");
+            return Some(
+                Finding::warning(COORD_NEAR_EVENT, message).help(format!("did you mean `{component}{FAULTED}`?")),
+            );
+        }
+        let component = event.strip_suffix(FAULTED)?;
         (!created.contains(component)).then(|| {
             Finding::warning(COORD_NEAR_EVENT, format!("`{event}` never comes: there is no component `{component}`"))
                 .help(did_you_mean(component, "components", created.iter().copied()))
@@ -113,6 +122,7 @@ fn is_slip(one: &str, other: &str) -> bool {
     if one.eq_ignore_ascii_case(other) {
         return true;
     }
+    let (one, other) = (&*one.to_lowercase(), &*other.to_lowercase());
     // In a short name two letters make another word; and another number is another thing.
     let slips = if one.chars().count() < 8 { 1 } else { 2 };
     strsim::damerau_levenshtein(one, other) <= slips

@@ -65,10 +65,11 @@ impl Tried {
         Self { unreached, ..self }
     }
 
-    /// Whether an operator would raise an event for some for whom nobody does.
+    /// Whether an operator would have to raise an event for some for whom nobody does. What a monitor, a component of the simulated platform or
+    /// a subsystem tells comes by itself.
     pub(super) fn is_for_unreached(&self, product: &Product<'_>, name: EventName) -> bool {
         let hears = |at: &usize| product.members[*at].chart.event(name) != EventId::OTHER;
-        !product.is_told_by_child(name) && self.unreached.iter().any(hears)
+        self.unreached.iter().any(hears) && !product.is_told_by_child(name) && !product.is_reported(name)
     }
 
     /// The first of these moves after which a bring-up has failed, though every request is answered *ok*: by which

@@ -140,8 +140,10 @@ fn stops(
                 let (member, leaf) = (&product.members[number], way.end().leaves[number]);
                 let (name, fqn) = (member.name, member.chart.fqn(leaf));
                 let message = format!("{what} does not begin for `{name}`: it does not wait for `{event}` in `{fqn}`");
+                // A component may raise something there that its type does not tell.
+                let severity = if deployment.kind.imitates { Severity::Error } else { Severity::Warning };
                 let nobody = "nor does anybody who tells it anything";
-                return Finding::error(code, message)
+                return Finding::new(severity, code, message)
                     .also(member.chart.origin(leaf), nobody)
                     .help(format!(
                         "add a transition for `{event}` there, or let a coordinator that waits for it tell `{name}`"

@@ -22,7 +22,7 @@ use crate::session::Session;
 use crate::session::socket::ControlSocket;
 use crate::time::{Clock, lock};
 use serde_json::json;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Run a script: deploy, raise events, wait for states and answers with time limits, measure, assert, undo, shut down.
@@ -126,7 +126,7 @@ impl Run for Args {
         let stopped = |well| end.ended.as_ref().map_or(well, |ended| Exit::of_stop(ended, well));
         let written = self.samples.map_or(Ok(Exit::Done), |folder| figures::write_samples(&folder, &end.samples));
         let Some(failure) = end.failure else { return written.map(|_| stopped(Exit::Done)) };
-        let mut failure = tell(failure);
+        let mut failure = tell(&self.script, failure);
         failure.exit = stopped(failure.exit);
         Err(failure)
     }
@@ -196,13 +196,18 @@ pub fn known(name: &str, extensions: &Extensions) -> Result<Ident, CommandFailur
     })
 }
 
-fn tell(failure: ScriptFailure) -> CommandFailure {
+fn tell(script: &Path, failure: ScriptFailure) -> CommandFailure {
     match failure {
         ScriptFailure::Unreadable(finding) => {
             CommandFailure { exit: Exit::Usage, ..CommandFailure::found(vec![*finding], SourceMap::new()) }
         }
         ScriptFailure::Lua { message, syntax: true } => {
-            CommandFailure::usage(SCRIPT_SYNTAX, message, "mend the script where the message points")
+            let is_yaml = script.extension().is_some_and(|ending| ending == "yaml" || ending == "yml");
+            let help = match is_yaml {
+                true => format!("a script is Lua; a deployment is brought up by `davit deploy {}`", script.display()),
+                false => "mend the script where the message points".to_owned(),
+            };
+            CommandFailure::usage(SCRIPT_SYNTAX, message, help)
         }
         ScriptFailure::Lua { message, syntax: false } => CommandFailure::no(
             SCRIPT_FAILED,

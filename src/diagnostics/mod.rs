@@ -5,6 +5,7 @@
 //! This room judges nothing and reads no file.
 
 mod extent;
+mod large;
 mod render;
 mod source_map;
 mod tokens;

@@ -1,12 +1,11 @@
 //! Where model elements were written.
 
+use super::large::Large;
 use super::{extent, yaml_extent};
-use crate::limits;
 use crate::model::Origin;
-use rustc_hash::FxHashMap;
 use std::borrow::Cow;
 use std::ops::Range;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 
 /// A file of a source map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
@@ -103,27 +102,6 @@ pub struct SourceMap {
     places: Vec<TextPlace>,
     speller: Option<Speller>,
     large: Large,
-}
-
-/// What looking in large elements came to. A copy, whose places may be others from then on, begins anew.
-#[derive(Debug, Default)]
-struct Large(Mutex<LargeElements>);
-
-impl Clone for Large {
-    fn clone(&self) -> Self {
-        Self::default()
-    }
-}
-
-/// Words that were looked for in large elements.
-#[derive(Debug, Default)]
-struct LargeElements {
-    /// Bytes that were looked through, against [`limits::PLACE_BYTES`].
-    bytes: usize,
-    /// What was found.
-    found: FxHashMap<u32, Location>,
-    /// The names of calls on large lines, by where these begin.
-    names: FxHashMap<(FileId, usize, &'static str), Vec<Range<usize>>>,
 }
 
 /// What a text is in a finding about a file of that language: the examples in it, which stand between backticks, are written as Lua has them.
@@ -276,19 +254,19 @@ impl SourceMap {
         if words.is_empty() {
             return Some(self.location(file, span));
         }
-        if let Some(found) = self.large().found.get(&origin.0) {
-            return Some(found.clone());
+        if let Some(found) = self.large.found(origin.0) {
+            return Some(found);
         }
         // Past the budget the element around it is shown.
-        if self.is_tired() {
+        if self.large.is_tired() {
             return Some(self.location(file, span));
         }
         let inside = self.reach(at, file, &span);
-        let is_large = self.looks_through(inside.len());
+        let is_large = self.large.looks_through(inside.len());
         let is_line = matches!(self.places.get(at.0 as usize), Some(TextPlace::Line { .. }));
         let found = self.location(file, self.find(file, (span, inside), is_line, &words));
         if is_large {
-            self.large().found.insert(origin.0, found.clone());
+            self.large.note(origin.0, found.clone());
         }
         Some(found)
     }
@@ -318,7 +296,7 @@ impl SourceMap {
         if let Some(found) = self.locate_word(origin, word) {
             return Some(found);
         }
-        let whole = self.locate(origin).filter(|_| !self.is_tired())?;
+        let whole = self.locate(origin).filter(|_| !self.large.is_tired())?;
         let source = self.file(whole.file);
         let inside = self.inside(origin, &whole);
         let found = match word.split_once('/') {
@@ -342,26 +320,8 @@ impl SourceMap {
         }
     }
 
-    fn large(&self) -> MutexGuard<'_, LargeElements> {
-        self.large.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// Whether so much was looked through that it is time to say less exactly where things stand.
-    fn is_tired(&self) -> bool {
-        self.large().bytes > limits::PLACE_BYTES
-    }
-
-    /// So many bytes are; whether they are many: few are nothing that adds up.
-    fn looks_through(&self, bytes: usize) -> bool {
-        let is_large = bytes > limits::PLACE_LARGE;
-        if is_large {
-            self.large().bytes += bytes;
-        }
-        is_large
-    }
-
     fn locate_word(&self, origin: Origin, word: &str) -> Option<Location> {
-        let whole = self.locate(origin).filter(|_| !self.is_tired())?;
+        let whole = self.locate(origin).filter(|_| !self.large.is_tired())?;
         let source = self.file(whole.file);
         let of_lines = !matches!(self.places.get(origin.0 as usize), Some(TextPlace::Exact { .. }));
         if of_lines && source.line(whole.line).end == whole.span.end {
@@ -371,7 +331,7 @@ impl SourceMap {
             return found.map(|span| self.location(whole.file, span));
         }
         let inside = self.inside(origin, &whole);
-        self.looks_through(inside.len());
+        self.large.looks_through(inside.len());
         Some(self.location(whole.file, extent::find(&source.text, inside, word)?))
     }
 
@@ -417,27 +377,16 @@ impl SourceMap {
             TextPlace::Call { file, line, nth, word } => {
                 let source = self.file(*file);
                 let line = source.line(*line);
-                let found = self.nth_name(*file, line.clone(), word, *nth as usize).unwrap_or_else(|| {
-                    let indent = source.text[line.clone()].len() - source.text[line.clone()].trim_start().len();
-                    line.start + indent..line.end
-                });
+                let found = self
+                    .large
+                    .nth_name((*file, &source.text), line.clone(), word, *nth as usize)
+                    .unwrap_or_else(|| {
+                        let indent = source.text[line.clone()].len() - source.text[line.clone()].trim_start().len();
+                        line.start + indent..line.end
+                    });
                 (*file, found)
             }
         })
-    }
-
-    /// The `nth` name `word` on a line, or the last one where there are fewer. Of a large line all are looked for at once.
-    fn nth_name(&self, file: FileId, line: Range<usize>, word: &'static str, nth: usize) -> Option<Range<usize>> {
-        let text = &self.file(file).text;
-        if line.len() <= limits::PLACE_LARGE {
-            let mut last = None;
-            let mut names = extent::names(text, line, word).inspect(|name| last = Some(name.clone()));
-            return names.nth(nth).or(last);
-        }
-        let mut large = self.large();
-        let names = large.names.entry((file, line.start, word));
-        let names = names.or_insert_with(|| extent::names(text, line, word).collect());
-        names.get(nth).or(names.last()).cloned()
     }
 
     /// The bytes in which parts of the element at `origin` are looked for.

@@ -107,6 +107,10 @@ impl Params {
 
     /// Reports parameters that no file has read: they are most likely misspelt.
     pub fn finish(self, cx: &mut Cx) {
+        // What does not parse was not run, and may have read it.
+        if cx.findings.iter().any(|finding| finding.code == codes::TEXT_SYNTAX) {
+            return;
+        }
         let others: Vec<String> = self.all.iter().filter(|p| !p.set || p.used).map(|p| p.name.clone()).collect();
         for param in self.all.iter().filter(|p| !p.used) {
             let within = if param.set { self.place.within.as_str() } else { "" };

@@ -5,7 +5,7 @@ use super::spelling::{as_yaml, told_in_yaml};
 use super::spelling_xml::told_in_scxml;
 use crate::diagnostics::{FileId, Language, SourceMap};
 use crate::limits;
-use crate::model::finding::did_you_mean;
+use crate::model::finding::{did_you_mean, nearest};
 use crate::model::{Finding, Findings, Origin, codes};
 use std::borrow::Cow;
 
@@ -294,7 +294,14 @@ impl Fields {
                 continue;
             }
             let origin = cx.part(entry.origin, &entry.key);
-            let help = did_you_mean(&entry.key, "keys", object.names());
+            let inside = matches!(entry.value.kind, Kind::Map(_)) && object.what == "a state";
+            let help = match nearest(&entry.key, object.names()) {
+                // In Lua a state is made by its function.
+                None if inside && cx.is_lua(entry.origin) => {
+                    format!("a state inside is made by `state`: `{} = state {{ … }}`", entry.key)
+                }
+                _ => did_you_mean(&entry.key, "keys", object.names()),
+            };
             cx.report(
                 Finding::error(codes::TEXT_UNKNOWN_KEY, format!("{} has no `{}`", object.what, entry.key))
                     .at(origin)

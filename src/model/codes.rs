@@ -389,6 +389,8 @@ codes! {
         "The type declares this property without a default, so a component cannot be created without a value for it. Give the value in the create itself; a property_set beside it comes too late, for the component would exist without one in between.";
     CLASH = "conf::clash", "two changes of one configuration do not commute",
         "The changes of a configuration are a set: no order is promised among them. These two touch the same thing and would leave different systems in different orders. Keep one of them, or write two configurations and apply them one after the other.";
+    CHANGE_TWICE = "conf::change_twice", "one change stands twice in a configuration",
+        "The changes of a configuration are a set: what stands in it twice, word for word, is done once. An operation that is to be called twice is called by two configurations, one after the other. Of everything else remove one.";
     DEFAULT_TWICE = "conf::default_twice", "`_default` stands twice in one list",
         "`_default` stands for every component that the same list does not name; twice in one list it would demand two states of all of them. Keep one, and name the components that are to be in another state.";
     PRE_ON_CREATED = "conf::pre_on_created", "a component that is created here cannot be in the pre-state list",

@@ -295,6 +295,12 @@ impl Deployment {
         }
     }
 
+    /// Whether a name is that of a configuration, and not of a subsystem.
+    pub fn names_configuration(&self, name: &str) -> bool {
+        let is_subsystem = || self.subsystems.iter().any(|subsystem| subsystem.name.as_str() == name);
+        ConfigId::new(name).is_ok_and(|id| self.configuration(id).is_some()) && !is_subsystem()
+    }
+
     /// Why an event cannot come from outside (of a component, a monitor, an operator): it tells what only Davit knows, or what only
     /// its coordinators tell each other. None: it can.
     pub fn never_from_outside(&self, event: &str) -> Option<String> {
@@ -302,6 +308,8 @@ impl Deployment {
             Some(format!("`{event}` is told of a subsystem by itself, and nobody else raises it"))
         } else if is_internal(event) {
             Some(format!("`{event}` is an event of the statechart itself, which nobody else raises"))
+        } else if self.names_configuration(event) {
+            Some(format!("`{event}` is a configuration, which is asked for and not raised"))
         } else if !self.looks_like_answer(event) {
             let told = || format!("`{event}` is what coordinators tell each other, which nobody else raises");
             self.is_theirs_alone(event).then(told)

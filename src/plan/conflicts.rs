@@ -7,18 +7,26 @@ use std::collections::hash_map::Entry;
 
 /// What a change is about; two changes with one subject are the same act twice, or they clash.
 #[derive(PartialEq, Eq, Hash, Clone, Copy)]
-enum ConflictSubject {
+pub enum ConflictSubject {
+    /// That a component is made, or made anew.
     Create(ComponentName),
+    /// That it is taken away.
     Destroy(ComponentName),
+    /// A connection that is made.
     Connect(MemberRef, MemberRef),
+    /// One that is taken away.
     Disconnect(MemberRef, MemberRef),
+    /// The value of a property.
     Property(MemberRef),
+    /// What is written on a port.
     Port(MemberRef),
+    /// A call.
     Operation(MemberRef),
 }
 
 impl ConflictSubject {
-    fn of(kind: &ChangeKind) -> Self {
+    /// What that one is about.
+    pub fn of(kind: &ChangeKind) -> Self {
         match kind {
             ChangeKind::Create { component, .. } | ChangeKind::Replace { component, .. } => Self::Create(*component),
             ChangeKind::Destroy { component } => Self::Destroy(*component),

@@ -19,6 +19,7 @@ pub mod undo;
 use crate::model::words::words;
 use crate::model::{ComponentName, ConfigId, Configuration, Deployment, Finding, Findings, Ident, Origin, Step};
 use crate::system::{Overlay, Reversibility, System, Undo};
+pub use conflicts::ConflictSubject;
 use footprint::{Footprint, Saved, Slot};
 use smallvec::SmallVec;
 use std::collections::BTreeSet;

@@ -117,13 +117,14 @@ fn a_near_event_is_a_slip_where_it_is_near_enough_and_nobody_declares_it() {
     // One word of it is another one: what is to be done and what has been, something and its contrary, another axis.
     for (heard, accepted, told) in [
         ("e_released", "e_release", 0),
-        ("e_closing", "e_close", 1),
+        ("e_opening", "e_open", 0),
         ("e_opened", "e_open", 0),
         ("e_gate_unlocked", "e_gate_locked", 0),
         ("e_limit_x", "e_limit_y", 0),
         ("e_limit_x_hit", "e_limit_y_hit", 0),
         ("e_EC_TIMEOUT", "e_ec_timeout", 1),
         ("e_Reset", "e_reset", 1),
+        ("E_jam_", "e_jam", 1),
         ("e_gate_lockd", "e_gate_locked", 1),
         ("e_gate_unlocekd", "e_gate_unlocked", 1),
     ] {
@@ -292,4 +293,47 @@ fn an_event_that_nobody_can_mean_is_told() {
     }
     let more = "trans { src = \"stuck\", tgt = \"leaving\", events = { \"a.faulted\", \"e_after(1.5)\" } },";
     assert!(texts(&check(more, ""), "coord::near_event").is_empty());
+}
+
+/// What is written nearly as an answer, or as what a subsystem tells, is told as that.
+#[test]
+fn what_is_no_answer_and_no_event_is_told_as_what_was_meant() {
+    let told = |event: &str, code: &str| {
+        let said = check(&format!("trans {{ src = 'up', tgt = 'leaving', events = {{ '{event}' }} }},"), "");
+        texts(&said, code).iter().map(|(message, help)| format!("{message}; {help}")).collect::<Vec<_>>()
+    };
+    let done = told("base.done", "coord::answer_never_comes");
+    assert!(
+        done.len() == 1
+            && done[0].starts_with("`base.done` never comes: `base` is not answered so; `base` is answered `base.ok`"),
+        "{done:?}"
+    );
+    let undone = told("base.undo.ok", "coord::answer_never_comes");
+    assert!(undone.len() == 1 && undone[0].contains("`base.undo` is answered `base.undone`"), "{undone:?}");
+    let soft = told("soft.ok", "coord::answer_never_comes");
+    assert!(soft.len() == 1 && soft[0].contains("the coordinator does not ask for `soft`"), "{soft:?}");
+    let fault = told("a.faultd", "coord::near_event");
+    assert!(fault.len() == 1 && fault[0].ends_with("did you mean `a.faulted`?"), "{fault:?}");
+    let base = told("base", "coord::unknown_answer");
+    assert!(
+        base.len() == 1 && base[0].ends_with("nobody raises it; did you mean `base.ok`, which answers it?"),
+        "{base:?}"
+    );
+}
+
+/// What stands twice is done once: of a call that may have been meant otherwise.
+#[test]
+fn a_change_that_stands_twice_is_told() {
+    let told = |changes: &str| {
+        let small = Small::new(&format!("base = Configuration {{ create('a', 'Drive'), {changes} }}"), STATES, "");
+        let said = small.check();
+        let told = said.of("conf::change_twice").into_iter();
+        told.map(|f| (f["severity"].as_str().unwrap().to_owned(), f["message"].as_str().unwrap().to_owned()))
+            .collect::<Vec<_>>()
+    };
+    assert!(told("property_set('a.gain', 2.0), operation_call('a.open')").is_empty());
+    let [(severity, message)] = &told("operation_call('a.open'), operation_call('a.open')")[..] else { panic!("one") };
+    assert!(severity == "warning" && message.contains("a.open") && message.contains("stands twice"), "{message}");
+    let set = told("property_set('a.gain', 2.0), property_set('a.gain', 2.0), property_set('a.gain', 2.0)");
+    assert!(set.len() == 2 && set.iter().all(|(severity, _)| severity == "info"), "{set:?}");
 }

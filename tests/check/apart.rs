@@ -98,6 +98,16 @@ fn that_another_one_hears_it_leads_nobody_down() {
         let told: Vec<_> = told.iter().filter(|f| f.code == code).map(|f| f.message.as_str()).collect();
         assert!(told.len() == 1 && told[0].contains("does not begin for `b`") && told[0].contains(at), "{told:?}");
     }
+    // Where something tells it by itself nobody has to know: a monitor, or a component.
+    let reports = "simulated: { reactions: [{ after: create x, delay_s: 0.1, raise: e_on, component: x }] }\n";
+    let makes = hears.replace("up = state {}", "up = state { entry = 'make' }");
+    let small = Small::several(
+        "make = Configuration { create('x', 'Drive') }",
+        &[("a", &makes), ("b", &of("e_on", "e_shutdown"))],
+        reports,
+    );
+    let told = followed(&small, false).findings;
+    assert!(!told.iter().any(|f| f.message.contains("does not begin")), "{told:#?}");
     // Who is told by one that hears it is led by that.
     let told = tells.replace("up = state {}", "up = state { exit = 'e_b_off' }");
     let small = Small::several("", &[("a", &told), ("b", &of("e_start", "e_b_off"))], "emits: [e_b_off]\n");

@@ -115,6 +115,23 @@ fn an_interrupted_check_tells_what_it_found() {
     assert!(told.contains("not all there are") && !told.contains("never"), "{told}");
 }
 
+/// A script that is to end while its deployment is being checked brings nothing up.
+#[test]
+fn an_interrupted_script_checks_no_further_and_brings_nothing_up() {
+    let demo = switches(40);
+    demo.write("script.lua", "deploy('deployment.yaml')\nshutdown()\n");
+    let (out, err) = (demo.path("out"), demo.path("err"));
+    let mut command = demo.command(&["run", "script.lua"]);
+    command.stdout(File::create(&out).expect("a file")).stderr(Stdio::from(File::create(&err).expect("a file")));
+    let running = Foreground::start(&mut command);
+    until_it_follows(&running);
+    running.signal(libc::SIGINT);
+    let status = running.end();
+    let told = demo.read("out") + &demo.read("err");
+    assert_eq!(status.code(), Some(1), "{told}");
+    assert!(told.contains("interrupted") && !told.contains(" in  ") && !told.contains("refused"), "{told}");
+}
+
 /// A `check` that goes on for long with its errors on a terminal: what is shown there, for whoever receives it, and the process.
 fn on_a_terminal(demo: &Demo, more: &[&str]) -> (Foreground, mpsc::Receiver<String>) {
     let (mut person, program) = terminal();

@@ -103,7 +103,9 @@ impl Small {
         }
         // It is about a coordinator that does not do what `check` demands.
         let read = app::read(&folder.path().join("d.yaml"), &LoadOptions::default(), libraries::builtin());
-        let checked = read.and_then(app::check_to_replay).unwrap_or_else(|refused| panic!("{:#?}", refused.findings));
+        let checked = read
+            .and_then(|read| app::check_while(read, true, &|| true))
+            .unwrap_or_else(|refused| panic!("{:#?}", refused.findings));
         let clock = Clock::simulated();
         let guard = clock.enter();
         let two = |step: &str| (StepPattern::new(step), Duration::from_secs(2));

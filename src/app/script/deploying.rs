@@ -4,7 +4,7 @@ use super::failure::IsRefused;
 use super::options::OptionFields;
 use super::{SharedHost, clock, error, interrupt};
 use crate::app::start::Played;
-use crate::app::{StartError, check, check_to_replay, read_for, start};
+use crate::app::{StartError, check_while, read_for, start};
 use crate::lang::LoadOptions;
 use crate::session::NotUp;
 use mlua::Table;
@@ -22,9 +22,13 @@ pub(super) fn deploy(host: &SharedHost, file: &str, options: Option<Table>) -> m
         let options = &host.options;
         let load = LoadOptions { set, ..options.load.clone() };
         let read = read_for(&path, &load, &options.extensions, options.platform);
-        let checked = read.and_then(|read| if replay { check_to_replay(read) } else { check(read) });
+        // Who wants it to end waits for no check.
+        let interrupt = options.interrupt.clone();
+        let is_wanted = || interrupt.check().is_ok();
+        let checked = read.and_then(|read| check_while(read, replay, &is_wanted));
         (path, checked)
     };
+    interrupt(host).check()?;
     if let Ok(checked) = &checked
         && replay
         && (!checked.deployment.kind.imitates || !clock(host).is_simulated())

@@ -55,7 +55,7 @@ impl ScriptParameters {
             };
             !self.read.contains(name) && refused.findings.iter().any(here)
         });
-        ours.filter(|_| unknown && !self.read.is_empty()).map(|(name, _)| self.unread(name))
+        ours.filter(|_| unknown).map(|(name, _)| self.unread(name))
     }
 }
 

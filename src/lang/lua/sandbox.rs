@@ -264,10 +264,13 @@ pub fn undefined(lua: &Lua, shared: &SharedRecorder, table: &Table, prefix: &str
             None => {
                 let near = nearest(&name, known.iter().map(String::as_str));
                 let help = match near {
+                    Some(near) if prefix.is_empty() => {
+                        format!("did you mean `{near}`? what is a name of something stands in quotes: `\"{name}\"`")
+                    }
                     Some(near) => format!("did you mean `{prefix}{near}`?"),
                     None if prefix.is_empty() => format!(
-                        "define it in the file (`local {name} = …`), or give it as a parameter: `with: {{ {name}: … }}` \
-                         in the deployment, or `--set {name}=…`"
+                        "if it is a name of something, write it in quotes: `\"{name}\"`; else define it in the file \
+                         (`local {name} = …`), or give it as a parameter: `with: {{ {name}: … }}` in the deployment, or `--set {name}=…`"
                     ),
                     None => did_you_mean(&name, "functions", known.iter().map(String::as_str)),
                 };
