@@ -2,7 +2,7 @@
 //! found is kept, and there is a budget.
 
 use super::extent;
-use super::source_map::{FileId, Location};
+use super::source_file::{FileId, Location};
 use crate::limits;
 use rustc_hash::FxHashMap;
 use std::ops::Range;

@@ -1,6 +1,7 @@
 //! The one rendering of findings, for terminals and as JSON.
 
-use super::source_map::{FileId, Location, SourceMap};
+use super::source_file::{FileId, Location};
+use super::source_map::SourceMap;
 use crate::model::finding::count;
 use crate::model::{Finding, Origin, Severity};
 use miette::{
@@ -294,7 +295,7 @@ impl SourceCode for SourceWindow {
 
 #[cfg(test)]
 mod tests {
-    use super::super::source_map::Language;
+    use super::super::source_file::Language;
     use super::*;
     use crate::model::finding::Code;
 
