@@ -58,6 +58,9 @@ pub const SOCKET_STEP: Duration = Duration::from_millis(10);
 /// How often a command that follows a quiet deployment looks whether anybody reads it still.
 pub const FOLLOW_LOOK: Duration = Duration::from_millis(250);
 
+/// How long stopping stands still, held by a safe configuration, before it is told what leads on.
+pub const STANDS_TOLD: Duration = Duration::from_secs(2);
+
 /// How soon an event that a component goes on raising while it is being stopped is told again.
 pub const REPORTED_AGAIN: Duration = Duration::from_secs(5);
 

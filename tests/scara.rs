@@ -138,6 +138,7 @@ fn story(set: &[(&str, &str)]) -> (ScriptEnd, String) {
             observer: Some(Arc::new(Heard(said.clone()))),
             interrupt: Interrupt::default(),
             door: None,
+            checking: None,
             say: Box::new(move |text| *heard.lock().unwrap() += &format!("{text}\n")),
         },
     );

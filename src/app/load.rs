@@ -126,27 +126,30 @@ fn read_loaded(loaded: Loaded, extensions: &Extensions, other: Option<Ident>) ->
 /// # Errors
 /// [`Refused`] with everything that reading and checking found.
 pub fn check(read: Read) -> Result<Checked, Refused> {
-    checked(read, &|| true, |report| report.checked.take())
+    checked(read, &|_| Ok(()), |report| report.checked.take())
 }
 
-/// The same as long as somebody wants it: asked every few milliseconds. Where nobody does any more it ends, and says nothing of the deployment.
+/// The same as long as it `goes_on`: told every few milliseconds how far it is. Where it does not it ends, and says nothing of the deployment.
 /// One `to_replay` is to go a way that `davit check` found, on the simulated platform: what was found by following its coordinators does not
 /// refuse it.
 ///
 /// # Errors
 /// [`Refused`] with all findings.
-pub fn check_while(read: Read, to_replay: bool, is_wanted: &(dyn Fn() -> bool + Sync)) -> Result<Checked, Refused> {
-    checked(read, is_wanted, |report| if to_replay { report.replayed.take() } else { report.checked.take() })
+pub fn check_while(
+    read: Read,
+    to_replay: bool,
+    goes_on: &(dyn Fn(Far) -> Result<(), Halt> + Sync),
+) -> Result<Checked, Refused> {
+    checked(read, goes_on, |report| if to_replay { report.replayed.take() } else { report.checked.take() })
 }
 
 fn checked(
     read: Read,
-    is_wanted: &(dyn Fn() -> bool + Sync),
+    goes_on: &(dyn Fn(Far) -> Result<(), Halt> + Sync),
     take: impl FnOnce(&mut Report) -> Option<check::Accepted<Deployment>>,
 ) -> Result<Checked, Refused> {
     let Read { deployment, catalogue, libraries, platform, sources, findings: before } = read;
-    let goes_on = |_: Far| if is_wanted() { Ok(()) } else { Err(Halt::Interrupted) };
-    let mut report = check::run_with(deployment, &catalogue, Effort { goes_on: &goes_on, ..Effort::default() });
+    let mut report = check::run_with(deployment, &catalogue, Effort { goes_on, ..Effort::default() });
     let taken = take(&mut report);
     let mut findings = report.findings;
     findings.extend(before);

@@ -20,6 +20,7 @@ mod values;
 mod waits;
 
 use super::{Extensions, Refused};
+use crate::check::Far;
 use crate::functions::message_within;
 use crate::lang::{LoadOptions, Sources};
 use crate::limits;
@@ -62,7 +63,12 @@ pub struct ScriptOptions {
     pub interrupt: Interrupt,
     /// Makes a deployment on the real clock, of that file, known under its name, until it is down; or says why that cannot be.
     pub door: Option<Door>,
+    /// Begins to tell how far the check of a deployment is; what it answers is dropped at the end of it.
+    pub checking: Option<CheckTeller>,
 }
+
+/// See [`ScriptOptions::checking`].
+pub type CheckTeller = Box<dyn Fn() -> Box<dyn Fn(Far) + Sync>>;
 
 /// See [`ScriptOptions::door`].
 pub type Door = Box<dyn Fn(&Arc<Session>, &Path) -> Result<Box<dyn Any>, String>>;

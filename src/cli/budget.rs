@@ -199,21 +199,29 @@ impl Following {
         let watched = signal_hook::flag::register_conditional_default(SIGINT, interrupted.clone());
         let watched =
             watched.and_then(|ends| Ok(vec![ends, signal_hook::flag::register(SIGINT, interrupted.clone())?]));
+        let mut following = Self::before_acting(silent);
+        (following.budget, following.interrupted) = (budget, interrupted);
+        following.signals = watched.unwrap_or_default();
+        Ok(following)
+    }
+
+    /// The same before something else is done: it only tells how far it is, and Ctrl-C is the command's.
+    pub fn before_acting(silent: bool) -> Self {
         // It draws on a terminal only.
         let target = if silent { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
         let bar = ProgressBar::with_draw_target(None, target);
-        bar.set_style(ProgressStyle::with_template("{spinner} {msg}").expect("a valid template"));
+        bar.set_style(ProgressStyle::with_template("{spinner} {wide_msg}").expect("a valid template"));
         let clock = Clock::real();
         let began = clock.now();
-        Ok(Self {
-            budget,
+        Self {
+            budget: CheckBudget::default(),
             clock,
             began,
             bar,
-            interrupted,
-            signals: watched.unwrap_or_default(),
+            interrupted: Arc::default(),
+            signals: Vec::new(),
             told: Mutex::new(ToldSoFar { at: began, states: FxHashMap::default() }),
-        })
+        }
     }
 
     /// Tells how far it is, and whether it goes on.
@@ -228,8 +236,14 @@ impl Following {
         if self.budget.memory.is_some_and(over) {
             return Err(Halt::Memory);
         }
+        self.tell(far);
+        Ok(())
+    }
+
+    /// Tells how far it is.
+    pub fn tell(&self, far: Far) {
         if self.bar.is_hidden() {
-            return Ok(());
+            return;
         }
         let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
         let states = told.states(far.states);
@@ -239,13 +253,13 @@ impl Following {
             told.at = now;
             #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
             let rate = (states as f64 / spent.as_secs_f64()) as u64;
-            self.bar.set_message(format!(
-                "following: {}; {rate} states/s; Ctrl-C tells what was found so far",
-                self.budget.so_far(states, far.transitions)
-            ));
+            let so_far = self.budget.so_far(states, far.transitions);
+            self.bar.set_message(match self.signals.is_empty() {
+                true => format!("checking: {so_far}; {rate} states/s"),
+                false => format!("Ctrl-C tells what was found so far; following: {so_far}; {rate} states/s"),
+            });
             self.bar.tick();
         }
-        Ok(())
     }
 
     /// It is over; whether it was interrupted.

@@ -10,6 +10,7 @@ use super::progress::ProgressView;
 use super::signals::SignalWatch;
 use super::{CommandContext, CommandFailure, CommandResult, Run};
 use crate::app::{self, Checked, StartError};
+use crate::model::Severity;
 use crate::model::codes::{
     CLI_CONTRADICTS, CLI_NAME_TAKEN, CLI_SYSTEM, DEPLOY_NO_PLATFORM, FUNCTIONS_NOT_OPENED, TYPE_DIFFERS,
 };
@@ -96,7 +97,10 @@ impl Run for Args {
 
 impl Args {
     fn deploy(&self, context: &CommandContext) -> CommandResult {
-        let checked = self.input.check(context)?;
+        let checked = self.input.check(context, self.json)?;
+        if !self.json {
+            tell_warnings(&context.out, &self.input, &checked);
+        }
         let clock = self.clock.make(self.pace.unwrap_or(1.0));
         let progress = ProgressView::new(context.out, self.json, &clock).map_err(short)?;
         let exit = self.foreground(context, &checked, &clock, &progress)?;
@@ -182,6 +186,17 @@ impl Args {
         drop(socket);
         // It is stopped, as far as that went: the defect is told by whoever started this.
         Ok(driven.unwrap_or_else(|panic| resume_unwind(panic)))
+    }
+}
+
+/// What was found refuses nothing; that there is something is said.
+fn tell_warnings(out: &Output, input: &CommandInput, checked: &Checked) {
+    let warnings = checked.findings.iter().filter(|finding| finding.severity == Severity::Warning).count();
+    if warnings > 0 {
+        let set: String = input.parameters.set.iter().map(|set| format!(" --set {set}")).collect();
+        let shows = format!("`davit check {}{set}` shows", input.file.display());
+        let them = if warnings == 1 { "it" } else { "them" };
+        out.error(format!("{}: {shows} {them}\n", count(warnings, "warning")));
     }
 }
 

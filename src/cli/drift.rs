@@ -3,7 +3,7 @@
 use super::exit::Exit;
 use super::inside::Inside;
 use super::output::Style;
-use super::remote::{Patience, WITHIN, connect, failure, seconds};
+use super::remote::{OnlyWhich, Patience, WITHIN, connect, failure, seconds};
 use super::status::text;
 use super::{CommandContext, CommandResult, Run};
 use crate::configurator::WAY_OUT;
@@ -15,9 +15,9 @@ use serde_json::{Value as Json, json};
 /// difference, or the platform cannot be read.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The running deployment's name; not needed while only one runs.
-    #[arg(value_parser = super::remote::deployment_name)]
-    name: Option<String>,
+    #[command(flatten)]
+    #[allow(missing_docs)] // a doc comment here would become the help of the whole command
+    which: OnlyWhich,
     #[command(flatten)]
     inside: Inside,
     #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = seconds, help = WITHIN)]
@@ -31,7 +31,7 @@ impl Run for Args {
     fn run(self, context: &CommandContext) -> CommandResult {
         let out = &context.out;
         let patience = Patience::within(self.within);
-        let mut client = connect(self.name.as_deref())?;
+        let mut client = connect(self.which.name())?;
         let drift = client.call("drift", &json!({ "within_s": self.within }), patience.left()).map_err(failure)?;
         let drift = match (self.inside.is_some(), drift.as_array()) {
             (true, Some(all)) => {

@@ -1,6 +1,7 @@
 //! What commands read: a deployment with all its files, or a coordinator alone; with the findings that keep a command
 //! from its work.
 
+use super::budget::Following;
 use super::exit::Exit;
 use super::inside::Inside;
 use super::{CommandContext, CommandFailure};
@@ -70,12 +71,18 @@ impl CommandInput {
         Ok(app::read_but_for(&self.file, &self.parameters.options()?, &context.extensions)?)
     }
 
-    /// Reads the deployment and checks it.
+    /// Reads the deployment and checks it; a line on a terminal tells how far that is, unless `silent`.
     ///
     /// # Errors
     /// What reading or checking found.
-    pub fn check(&self, context: &CommandContext) -> Result<Checked, CommandFailure> {
-        Ok(app::check(self.read(context)?)?)
+    pub fn check(&self, context: &CommandContext, silent: bool) -> Result<Checked, CommandFailure> {
+        let read = self.read(context)?;
+        let following = Following::before_acting(silent);
+        let goes_on = |far| {
+            following.tell(far);
+            Ok(())
+        };
+        Ok(app::check_while(read, false, &goes_on)?)
     }
 }
 

@@ -4,7 +4,7 @@ use super::exit::Exit;
 use super::inside::Hierarchy;
 use super::kept;
 use super::output::{Output, Style};
-use super::remote::{ASK, connect, failure};
+use super::remote::{ASK, OnlyWhich, connect, failure};
 use super::sieve::Sieve;
 use super::status::text;
 use super::{CommandContext, CommandFailure, CommandResult, Run, output};
@@ -23,9 +23,9 @@ use serde_json::{Value as Json, json};
 /// deeper subsystems only what goes wrong and what they and their parents tell each other.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The running deployment's name; not needed while only one runs.
-    #[arg(value_parser = super::remote::deployment_name)]
-    name: Option<String>,
+    #[command(flatten)]
+    #[allow(missing_docs)] // a doc comment here would become the help of the whole command
+    which: OnlyWhich,
     #[command(flatten)]
     hierarchy: Hierarchy,
     /// Only so many of the newest entries.
@@ -47,7 +47,7 @@ impl Run for Args {
         if self.follow {
             return self.follow(context);
         }
-        let asked = Client::connect(self.name.as_deref()).and_then(|mut client| {
+        let asked = Client::connect(self.which.name()).and_then(|mut client| {
             let log = client.call("log", &json!({ "last": self.at_most() }), ASK)?;
             Ok((log.as_array().cloned().unwrap_or_default(), self.status(&mut client)?))
         });
@@ -112,7 +112,7 @@ impl Args {
     }
 
     fn follow(&self, context: &CommandContext) -> CommandResult {
-        let mut client = match Client::connect(self.name.as_deref()) {
+        let mut client = match Client::connect(self.which.name()) {
             Ok(client) => client,
             Err(error) => {
                 let kept = self.kept(context, error)?;

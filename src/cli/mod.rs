@@ -227,6 +227,9 @@ fn run(extensions: Extensions) -> ExitCode {
             if let Err(unwritten) = error.print() {
                 output::failed(&unwritten);
             }
+            if let Some(tip) = remote::how_it_is_said(&error) {
+                output::error(&tip);
+            }
             return written(Output::new(Color::Auto), if error.use_stderr() { Exit::Usage } else { Exit::Done }).into();
         }
     };

@@ -130,7 +130,7 @@ impl Screen {
         } else {
             ProgressBar::hidden()
         };
-        bar.set_style(ProgressStyle::with_template("{spinner} {msg}").expect("a valid template"));
+        bar.set_style(ProgressStyle::with_template("{spinner} {wide_msg}").expect("a valid template"));
         Self { out, bar, quiet: false, json, at: 0.0, stopping: false, reported: BTreeMap::new() }
     }
 

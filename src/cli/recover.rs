@@ -3,7 +3,7 @@
 use super::drift::listed;
 use super::exit::Exit;
 use super::output::Style;
-use super::remote::{Patience, WITHIN, connect, failure, seconds};
+use super::remote::{OnlyWhich, Patience, WITHIN, connect, failure, seconds};
 use super::status::text;
 use super::{CommandContext, CommandFailure, CommandResult, Run};
 use crate::configurator::WAY_OUT;
@@ -18,9 +18,9 @@ use serde_json::{Value as Json, json};
 #[derive(Debug, clap::Args)]
 #[command(override_usage = "davit recover [NAME] --back|--accept [--within SECONDS] [--json]")]
 pub struct Args {
-    /// The running deployment's name; not needed while only one runs.
-    #[arg(value_parser = super::remote::deployment_name)]
-    name: Option<String>,
+    #[command(flatten)]
+    #[allow(missing_docs)] // a doc comment here would become the help of the whole command
+    which: OnlyWhich,
     /// Undo what remains: to the system before the interrupted application.
     #[arg(long, conflicts_with_all = ["accept", "forward"])]
     back: bool,
@@ -47,7 +47,7 @@ impl Run for Args {
         }
         let out = &context.out;
         let patience = Patience::within(self.within);
-        let mut client = connect(self.name.as_deref())?;
+        let mut client = connect(self.which.name())?;
         let params = json!({ "direction": if self.back { "back" } else { "accept" }, "within_s": self.within });
         let answer = client.call("recover", &params, patience.left()).map_err(failure)?;
         let whole = answer["recovered"] == true;

@@ -9,6 +9,7 @@ use crate::model::codes::{
 };
 use crate::session::client::{Client, ClientError};
 use crate::time::{Clock, Time};
+use clap::error::{ContextKind, ErrorKind};
 use serde_json::Value as Json;
 use std::time::Duration;
 
@@ -21,6 +22,37 @@ pub struct Which {
     /// The running deployment's name; not needed while only one runs.
     #[arg(long = "on", value_name = "NAME", value_parser = deployment_name)]
     pub name: Option<String>,
+}
+
+/// The same of a command that takes nothing else: the name alone, or as those say it that do.
+#[derive(Debug, clap::Args)]
+pub struct OnlyWhich {
+    /// The running deployment's name, with or without `--on`; not needed while only one runs.
+    #[arg(value_name = "NAME", value_parser = deployment_name)]
+    only: Option<String>,
+    #[arg(long = "on", value_name = "NAME", value_parser = deployment_name, conflicts_with = "only", hide = true)]
+    on: Option<String>,
+}
+
+impl OnlyWhich {
+    /// Which, if that is said.
+    pub fn name(&self) -> Option<&str> {
+        self.only.as_deref().or(self.on.as_deref())
+    }
+
+    /// Which, if that is said.
+    pub fn into_name(self) -> Option<String> {
+        self.only.or(self.on)
+    }
+}
+
+/// Of a command line that is not understood: how the deployment is said where something else is to be said, too.
+pub fn how_it_is_said(error: &clap::Error) -> Option<String> {
+    let said = |kind| error.get(kind).map(ToString::to_string);
+    let (extra, usage) = (said(ContextKind::InvalidArg)?, said(ContextKind::Usage)?);
+    let takes = ["event", "apply", "undo", "get", "set"].iter().any(|it| usage.contains(&format!("davit {it} ")));
+    let is_name = error.kind() == ErrorKind::UnknownArgument && deployment_name(&extra).is_ok();
+    (is_name && takes).then(|| format!("\n  tip: which deployment is meant is said with `--on {extra}`\n"))
 }
 
 /// A deployment's name as it is typed: what is kept of it, and its socket, are files of that name.
@@ -103,7 +135,10 @@ pub fn failure(error: ClientError) -> CommandFailure {
         ClientError::Several(names) => CommandFailure::usage(
             CLI_SEVERAL_RUNNING,
             format!("{} deployments are running", names.len()),
-            format!("say which: {}", names.iter().map(|n| format!("`{n}`")).collect::<Vec<_>>().join(", ")),
+            format!(
+                "say which, with `--on NAME`: {}",
+                names.iter().map(|n| format!("`{n}`")).collect::<Vec<_>>().join(", ")
+            ),
         ),
         ClientError::Unknown { name, help } => {
             let help = meant.map_or(help, |life| kept::ended(&life));

@@ -3,7 +3,7 @@
 use super::exit::Exit;
 use super::log::duration;
 use super::output::Style;
-use super::remote::{Patience, WITHIN, WaitFor, Which, ask, seconds};
+use super::remote::{OnlyWhich, Patience, WITHIN, WaitFor, Which, ask, seconds};
 use super::status::text;
 use super::{CommandContext, CommandResult, Run};
 use crate::configurator::WAY_OUT;
@@ -136,9 +136,9 @@ impl Run for UndoArgs {
 /// Refused while a coordinator's frame is in force: its undo may write over what was to stay.
 #[derive(Debug, clap::Args)]
 pub struct CommitArgs {
-    /// The running deployment's name; not needed while only one runs.
-    #[arg(value_parser = super::remote::deployment_name)]
-    name: Option<String>,
+    #[command(flatten)]
+    #[allow(missing_docs)] // a doc comment here would become the help of the whole command
+    which: OnlyWhich,
     /// Also while a coordinator's frame is in force. That frame stays, and can be undone as far as that then goes.
     #[arg(long)]
     force: bool,
@@ -153,7 +153,7 @@ impl Run for CommitArgs {
     fn run(self, context: &CommandContext) -> CommandResult {
         let wait = WaitFor { no_wait: false, wait: true, within: self.within };
         let params = json!({ "force": self.force });
-        let asking = Asking { which: Which { name: self.name }, wait, json: self.json };
+        let asking = Asking { which: Which { name: self.which.into_name() }, wait, json: self.json };
         asking.request(context, "commit", params, &asking.patience())
     }
 }
@@ -204,6 +204,9 @@ impl Asking {
             ));
             for reason in answer["reasons"].as_array().into_iter().flatten() {
                 out.line(format!("  {}", text(reason)));
+            }
+            for note in answer["notes"].as_array().into_iter().flatten() {
+                out.error(format!("note: {}\n", text(note)));
             }
             if verdict.ends_with(".broken") {
                 out.error(format!("note: it is broken; {WAY_OUT}\n"));

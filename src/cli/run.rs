@@ -1,5 +1,6 @@
 //! `davit run`
 
+use super::budget::Following;
 use super::deploy::{ClockKind, Leaving};
 use super::exit::Exit;
 use super::figures;
@@ -11,7 +12,7 @@ use super::progress::ProgressView;
 use super::signals::{self, SignalWatch};
 use super::{CommandContext, CommandFailure, CommandResult, Run};
 use crate::app::Extensions;
-use crate::app::script::{self, Door, Interrupt, ScriptEnd, ScriptFailure, ScriptOptions, ScriptSample};
+use crate::app::script::{self, CheckTeller, Door, Interrupt, ScriptEnd, ScriptFailure, ScriptOptions, ScriptSample};
 use crate::diagnostics::SourceMap;
 use crate::model::Ident;
 use crate::model::codes::{
@@ -106,6 +107,7 @@ impl Run for Args {
                 say,
                 interrupt,
                 door: Some(door(&clock, &leaving)),
+                checking: Some(checking(self.quiet || self.json)),
             },
         );
         clock.shutdown();
@@ -166,6 +168,14 @@ fn door(clock: &Clock, leaving: &Leaving) -> Door {
             leaving: leaving.clone(),
             _socket: socket,
         }))
+    })
+}
+
+/// A line that tells how far the check of a deployment is.
+fn checking(silent: bool) -> CheckTeller {
+    Box::new(move || {
+        let following = Following::before_acting(silent);
+        Box::new(move |far| following.tell(far))
     })
 }
 

@@ -2,7 +2,7 @@
 
 use super::exit::Exit;
 use super::output::{Output, Style};
-use super::remote::{ASK, Patience, WITHIN, connect, failure, seconds};
+use super::remote::{ASK, OnlyWhich, Patience, WITHIN, connect, failure, seconds};
 use super::status::text;
 use super::{CommandContext, CommandResult, Run};
 use crate::limits;
@@ -20,9 +20,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// down; 1 it is not down yet, or nobody answers; 4 shut down without its coordinator, by force, or incompletely.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The running deployment's name; not needed while only one runs.
-    #[arg(value_parser = super::remote::deployment_name)]
-    name: Option<String>,
+    #[command(flatten)]
+    #[allow(missing_docs)] // a doc comment here would become the help of the whole command
+    which: OnlyWhich,
     /// Without its coordinator: what is safe, what brings it to rest, then everything is removed.
     #[arg(long)]
     force: bool,
@@ -37,7 +37,7 @@ impl Run for Args {
     fn run(self, context: &CommandContext) -> CommandResult {
         let out = &context.out;
         let patience = Patience::within(self.within);
-        let mut client = connect(self.name.as_deref())?;
+        let mut client = connect(self.which.name())?;
         let name = client.name().to_owned();
         let done = Arc::new(AtomicBool::new(false));
         if !self.json {

@@ -3,7 +3,7 @@
 use super::exit::Exit;
 use super::inside::{Hierarchy, is_within};
 use super::output::{Output, Style, Table};
-use super::remote::{ASK, ask};
+use super::remote::{ASK, OnlyWhich, ask};
 use super::status::text;
 use super::{CommandContext, CommandFailure, CommandResult, Run};
 use crate::model::codes::CLI_NO_ANSWER;
@@ -18,9 +18,9 @@ use serde_json::{Value as Json, json};
 /// frames of a subsystem that is folded are one line.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The running deployment's name; not needed while only one runs.
-    #[arg(value_parser = super::remote::deployment_name)]
-    name: Option<String>,
+    #[command(flatten)]
+    #[allow(missing_docs)] // a doc comment here would become the help of the whole command
+    which: OnlyWhich,
     #[command(flatten)]
     hierarchy: Hierarchy,
     /// Print JSON (newest last); with `--in` each frame with its `number` in the whole stack, and what others hold with `holds`.
@@ -33,9 +33,9 @@ impl Run for Args {
         let out = &context.out;
         let Hierarchy { inside, depth } = &self.hierarchy;
         let mut frames = match inside.is_some() || depth.is_some() {
-            false => numbered(&ask(self.name.as_deref(), "stack", &json!({}), ASK)?),
+            false => numbered(&ask(self.which.name(), "stack", &json!({}), ASK)?),
             true => {
-                let status = ask(self.name.as_deref(), "status", &json!({}), ASK)?;
+                let status = ask(self.which.name(), "status", &json!({}), ASK)?;
                 if status["stack"].is_null() {
                     return Err(CommandFailure::no(
                         CLI_NO_ANSWER,

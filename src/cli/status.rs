@@ -27,6 +27,8 @@ pub struct Args {
     /// The deployments' names; not needed while only one runs.
     #[arg(value_name = "NAME", value_parser = super::remote::deployment_name)]
     names: Vec<String>,
+    #[arg(long = "on", value_name = "NAME", value_parser = super::remote::deployment_name, hide = true)]
+    on: Vec<String>,
     #[command(flatten)]
     hierarchy: Hierarchy,
     /// Print JSON: whole, with full names unless `--in` is given.
@@ -39,7 +41,8 @@ impl Run for Args {
         let out = &context.out;
         let inside = |seen: SeenStatus| seen.inside(&self.hierarchy.inside);
         let show = |seen: &[SeenStatus]| show(out, seen, self.hierarchy.depth, self.json);
-        match &self.names[..] {
+        let names = [self.names, self.on].concat();
+        match &names[..] {
             [] => match look(None) {
                 Ok(SeenStatus::Runs(status)) => {
                     // Who runs has died before, if ever.

@@ -10,7 +10,7 @@ use super::levels::{FilePart, each, folded, leaf, parts, states};
 use super::list::silent;
 use super::log::duration;
 use super::output::{self, Output, Style, Table};
-use super::remote::{connect, failure, seconds};
+use super::remote::{OnlyWhich, connect, failure, seconds};
 use super::status::{not_known, state_style, text};
 use super::status_view::{components, heading, held_by, indented, title, titled};
 use super::{CommandContext, CommandResult, Run};
@@ -37,9 +37,9 @@ const ANSWERS: Duration = Duration::from_secs(2);
 /// `davit status` has it. Ctrl-C ends it, and so does the end of the deployment. Exit status: 0; 1 the deployment did not answer at the end; 4 it died.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The running deployment's name; not needed while only one runs.
-    #[arg(value_parser = super::remote::deployment_name)]
-    name: Option<String>,
+    #[command(flatten)]
+    #[allow(missing_docs)] // a doc comment here would become the help of the whole command
+    which: OnlyWhich,
     #[command(flatten)]
     hierarchy: Hierarchy,
     /// How often to look, in seconds.
@@ -61,7 +61,7 @@ fn pause(text: &str) -> Result<f64, String> {
 impl Run for Args {
     fn run(self, context: &CommandContext) -> CommandResult {
         let out = &context.out;
-        let client = connect(self.name.as_deref())?;
+        let client = connect(self.which.name())?;
         let name = client.name().to_owned();
         let mut looking = Looks { client, asked: None, anew: false };
         let screen = (!self.json && output::is_terminal()).then(WatchScreen::new);

@@ -266,8 +266,10 @@ impl SourceMap {
         let source = self.file(file);
         let line = source.line_of(span.start);
         let start = source.line(line).start;
-        let column =
-            source.text.get(start..span.start).map_or(0, |t| if source.is_ascii() { t.len() } else { t.chars().count() });
+        let column = source
+            .text
+            .get(start..span.start)
+            .map_or(0, |t| if source.is_ascii() { t.len() } else { t.chars().count() });
         Location { file, line, column: u32::try_from(column).unwrap_or(u32::MAX).saturating_add(1), span }
     }
 

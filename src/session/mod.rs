@@ -7,6 +7,7 @@
 pub mod carried;
 pub mod client;
 mod connection;
+mod consequences;
 mod doors;
 mod halt;
 mod hierarchy;

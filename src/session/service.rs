@@ -137,7 +137,12 @@ impl Service for SessionService {
                 if session.setting(&name).is_some() {
                     return Err(refused(format!("`{name}` is no configuration"), format!("`davit set {name} VALUE`")));
                 }
-                request(&session, line, Ask::Apply(id), params, gone)
+                let before = session.before(id);
+                let mut answer = request(&session, line, Ask::Apply(id), params, gone)?;
+                if answer["ok"] == true {
+                    answer["notes"] = json!(session.consequences(id, &before));
+                }
+                Ok(answer)
             }
             "undo" => {
                 let ask = match (optional::<String>(params, "configuration")?, optional::<usize>(params, "to")?) {

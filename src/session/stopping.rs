@@ -208,7 +208,9 @@ impl Session {
         let hub = self.hub();
         let take_down = &self.deployment().shutdown;
         let goal = self.deployment().down_states();
-        let (mut deadline, mut said, mut stood) = (self.clock().now() + take_down.within, false, false);
+        let (mut deadline, mut said) = (self.clock().now() + take_down.within, false);
+        // Since when it stands still.
+        let mut stood: Option<Time> = None;
         let ticket = self.offer_watched(take_down.event, "deployment");
         if let Err(refused) = &ticket {
             hub.note(Happening::Forced { note: format!("`{}` was not delivered: {refused}", take_down.event) });
@@ -237,16 +239,20 @@ impl Session {
             // time begins anew.
             let (now, still) = (self.clock().now(), self.stands_still());
             // While nobody knows it is as it was.
-            let stands = still.as_ref().map_or(stood, Option::is_some);
-            if std::mem::replace(&mut stood, stands) && !stood {
-                deadline = now + take_down.within;
+            let stands = still.as_ref().map_or(stood.is_some(), Option::is_some);
+            if stands {
+                stood.get_or_insert(now);
+            } else if stood.take().is_some() {
+                (deadline, said) = (now + take_down.within, false);
             }
-            if now >= deadline {
+            // Who asked for it is told what leads on, once the coordinator has had its time to go on by itself.
+            let tells = stood.map(|since| since + limits::STANDS_TOLD).filter(|_| !said);
+            if now >= deadline || tells.is_some_and(|tells| now >= tells && self.is_still()) {
                 let late = || format!("not `{goal}` after {} s", take_down.within.as_secs_f64());
                 let note = match still {
                     Ok(Some(still)) => still.to_string(),
                     Ok(None) => break Came::Left(late()),
-                    Err(unanswered) if !stood => break Came::Left(format!("{}: {unanswered}", late())),
+                    Err(unanswered) if !stands => break Came::Left(format!("{}: {unanswered}", late())),
                     Err(unanswered) => unanswered.to_string(),
                 };
                 if !std::mem::replace(&mut said, true) {
@@ -255,7 +261,9 @@ impl Session {
                 deadline = now + take_down.within;
             }
             self.tell_slow();
-            hub.changed.wait(self.next_look(deadline));
+            // What is not still then is looked at when it changes.
+            let tells = tells.filter(|tells| *tells > now).unwrap_or(deadline);
+            hub.changed.wait(self.next_look(deadline.min(tells)));
         };
         ticket.into_iter().for_each(|ticket| hub.forget(ticket));
         came

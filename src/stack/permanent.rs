@@ -13,7 +13,10 @@ pub fn may_commit(stack: &Stack, by: Requester, force: bool) -> Result<(), Findi
     let Some(held) = stack.frames().iter().rev().find(|frame| !force && !frame.is_own(by)) else { return Ok(()) };
     Err(Finding::error(
         codes::STACK_HELD,
-        format!("`{}` is in force, a frame of the coordinator `{}`", held.configuration, held.requester),
+        format!(
+            "`{}` is in force, a frame of the coordinator `{}`: only with `--force` are the operator's own frames given up before it is undone",
+            held.configuration, held.requester
+        ),
     )
     .help(
         "commit when its coordinator has undone it (`davit stack` shows the frames), or with `--force`: then only your own \

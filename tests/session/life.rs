@@ -134,6 +134,7 @@ fn runs(story: &str) {
             observer: None,
             interrupt: Interrupt::default(),
             door: None,
+            checking: None,
             say: Box::new(move |text| heard.lock().unwrap().push(text.to_owned())),
         },
     );
@@ -160,6 +161,7 @@ fn run_text(text: &str) -> (Option<String>, Option<bool>) {
             observer: None,
             interrupt: Interrupt::default(),
             door: None,
+            checking: None,
             say: Box::new(|_| {}),
         },
     );

@@ -23,6 +23,7 @@ fn side_by_side() {
             observer: None,
             interrupt: Interrupt::default(),
             door: None,
+            checking: None,
             say: Box::new(|_| {}),
         },
     );

@@ -63,6 +63,7 @@ pub fn script(file: &Path, set: &[(&str, &str)]) -> ScriptEnd {
             observer: None,
             interrupt: Interrupt::default(),
             door: None,
+            checking: None,
             say: Box::new(|_| {}),
         },
     );

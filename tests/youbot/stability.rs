@@ -22,6 +22,7 @@ fn stable(stiffness: &str, delay: &str, law: &str) -> f64 {
             observer: None,
             interrupt: Interrupt::default(),
             door: None,
+            checking: None,
             say: Box::new(|_| {}),
         },
     );

@@ -5,6 +5,7 @@ use super::options::OptionFields;
 use super::{SharedHost, clock, error, interrupt};
 use crate::app::start::Played;
 use crate::app::{StartError, check_while, read_for, start};
+use crate::check::Halt;
 use crate::lang::LoadOptions;
 use crate::session::NotUp;
 use mlua::Table;
@@ -24,8 +25,12 @@ pub(super) fn deploy(host: &SharedHost, file: &str, options: Option<Table>) -> m
         let read = read_for(&path, &load, &options.extensions, options.platform);
         // Who wants it to end waits for no check.
         let interrupt = options.interrupt.clone();
-        let is_wanted = || interrupt.check().is_ok();
-        let checked = read.and_then(|read| check_while(read, replay, &is_wanted));
+        let tell = options.checking.as_ref().map(|begin| begin());
+        let goes_on = |far| {
+            tell.iter().for_each(|tell| tell(far));
+            interrupt.check().map_err(|_| Halt::Interrupted)
+        };
+        let checked = read.and_then(|read| check_while(read, replay, &goes_on));
         (path, checked)
     };
     interrupt(host).check()?;
