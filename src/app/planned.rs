@@ -2,9 +2,9 @@
 
 use super::Read;
 use crate::check::{self, Drive, Until, WayEvent};
-use crate::model::codes::{CLI_UNKNOWN_CONFIGURATION, DEPLOY_NEVER_DOWN, DEPLOY_NEVER_UP};
+use crate::model::codes::{CLI_UNKNOWN_CONFIGURATION, DEPLOY_NEVER_DOWN, DEPLOY_NEVER_UP, UNKNOWN_COMPONENT};
 use crate::model::finding::{configuration, did_you_mean, has_errors};
-use crate::model::{Ask, ConfigId, Finding, Findings, Ident, Snapshot};
+use crate::model::{Ask, ChangeKind, ConfigId, Configuration, Deployment, Finding, Findings, Ident, Snapshot};
 use crate::plan::{PlanContext, PlannedStep};
 use crate::stack::{Op, Requester, Stack, transaction};
 use crate::system::{System, step};
@@ -49,6 +49,20 @@ pub fn wrong_in_others(read: &Read, told: &[Finding]) -> Findings {
     wrong
 }
 
+/// Planning begins with nothing deployed: what creates what is not there then has to be named, too.
+fn begins_with_nothing(deployment: &Deployment, id: ConfigId, findings: &mut [Finding]) {
+    let creates = |c: &&Configuration| c.changes.iter().any(|change| matches!(change.kind, ChangeKind::Create { .. }));
+    let creators =
+        deployment.configurations.iter().filter(creates).map(|c| c.id.as_str()).filter(|c| *c != id.as_str());
+    let creators: Vec<&str> = creators.take(3).collect();
+    for finding in findings.iter_mut().filter(|f| f.code == UNKNOWN_COMPONENT && !creators.is_empty()) {
+        finding.help = Some(format!(
+            "configurations are planned one after the other, beginning with nothing deployed: name what creates it before, as in `{} {id}`",
+            creators.join(" ")
+        ));
+    }
+}
+
 /// Plans the configurations of these names, one after the other, beginning with nothing deployed. What is wrong with others
 /// refuses nothing (`wrong_in_others` tells it).
 ///
@@ -88,7 +102,12 @@ pub fn plan(read: &Read, names: &[impl AsRef<str>]) -> Result<Vec<Application>, 
     for id in ids {
         let Some(configuration) = deployment.configuration(id) else { continue };
         let request = Op::Push { configuration, requester: Requester::Operator, at: Time::default(), scope: None };
-        let transaction = transaction(&system, &stack, &[request], &context).map_err(|refusal| refusal.findings)?;
+        let transaction = transaction(&system, &stack, &[request], &context).map_err(|mut refusal| {
+            if planned.is_empty() {
+                begins_with_nothing(deployment, id, &mut refusal.findings);
+            }
+            refusal.findings
+        })?;
         for planned in transaction.steps.iter() {
             step::effect(&planned.step, &mut system);
         }

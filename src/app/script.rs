@@ -3,6 +3,7 @@
 //! A script is one participant of the clock: in simulated time nothing moves while it computes, so what it asserts is
 //! what it sees. Whatever happens, the deployment it brought up is taken down before the script's end is reported.
 
+mod arguments;
 mod deploying;
 mod failure;
 mod faults;
@@ -22,18 +23,19 @@ mod waits;
 use super::{Extensions, Refused};
 use crate::check::Far;
 use crate::functions::message_within;
-use crate::lang::{LoadOptions, Sources};
+use crate::lang::{self, LoadOptions, Sources};
 use crate::limits;
 use crate::model::finding::did_you_mean;
 use crate::model::{Ask, ConfigId, Ident};
 use crate::session::tap::LogSink;
 use crate::session::{Ended, NO_FORWARD, NotNamed, Session, Unanswered, recovery};
 use crate::time::{Clock, Time};
+pub use arguments::functions;
 use failure::IsRefused;
 pub use failure::ScriptFailure;
 pub use figures::{Figure, beside, digits};
 pub use interrupt::Interrupt;
-use mlua::{FromLua, Lua, Table, Value as LuaValue};
+use mlua::{FromLua, Lua, MultiValue, Table, Value as LuaValue};
 use options::{OptionFields, force};
 pub use recordings::ScriptSample;
 pub use scene::ScriptScene;
@@ -204,6 +206,10 @@ fn execute(path: &Path, text: &[u8], host: &SharedHost) -> Result<(), ScriptFail
             message: message_within(&error, limits::SCRIPT_MEMORY),
         },
     };
+    if let Some(again) = std::str::from_utf8(text).ok().and_then(lang::key_again) {
+        let message = format!("{}:{again}", path.display());
+        return Err(ScriptFailure::Lua { message, syntax: true });
+    }
     let (lua, guards) = sandbox::state().map_err(failed)?;
     install(&lua, host).map_err(failed)?;
     guards.budget.count.interrupted_by(interrupt(host).asked());
@@ -212,41 +218,6 @@ fn execute(path: &Path, text: &[u8], host: &SharedHost) -> Result<(), ScriptFail
     guards.budget.spend(limits::SCRIPT_INSTRUCTIONS, || chunk.exec()).map_err(failed)
 }
 
-/// Every function a script may call, for the help of an unknown one and for the documentation's test.
-pub const FUNCTIONS: &[&str] = &[
-    "deploy",
-    "raise",
-    "apply",
-    "undo",
-    "set",
-    "commit",
-    "drift",
-    "recover",
-    "signal",
-    "sample",
-    "expect",
-    "figure",
-    "param",
-    "wait",
-    "wait_state",
-    "wait_answer",
-    "assert_running",
-    "assert_state",
-    "state",
-    "property",
-    "port",
-    "system",
-    "stack",
-    "active",
-    "log",
-    "now",
-    "say",
-    "fault",
-    "inject",
-    "fail",
-    "shutdown",
-];
-
 fn install(lua: &Lua, host: &SharedHost) -> mlua::Result<()> {
     let globals = lua.globals();
     macro_rules! function {
@@ -254,24 +225,25 @@ fn install(lua: &Lua, host: &SharedHost) -> mlua::Result<()> {
             let host = host.clone();
             globals.set(
                 $name,
-                lua.create_function(move |$lua, $args: $types| {
+                lua.create_function(move |$lua, given: MultiValue| {
+                    let $args: $types = arguments::taken($name, given, $lua)?;
                     let $h = &host;
                     $body
                 })?,
             )?;
         }};
     }
-    function!("deploy", (String, Option<Table>), |h, _lua, (file, options)| deploying::deploy(h, &file, options));
-    function!("raise", (String, Option<Table>), |h, _lua, (event, options)| {
+    function!("deploy", (String, Option<Table>), |h, lua, (file, options)| deploying::deploy(h, &file, options));
+    function!("raise", (String, Option<Table>), |h, lua, (event, options)| {
         raise(h, &event, OptionFields::of("raise", options, &["to"])?.names("to")?)
     });
-    function!("apply", (String, Option<Table>), |h, _lua, (id, options)| {
+    function!("apply", (String, Option<Table>), |h, lua, (id, options)| {
         request(h, Some(&id), Ask::Apply, force("apply", options)?)
     });
-    function!("undo", (Option<String>, Option<Table>), |h, _lua, (id, options)| {
+    function!("undo", (Option<String>, Option<Table>), |h, lua, (id, options)| {
         request(h, id.as_deref(), Ask::UndoOf, force("undo", options)?)
     });
-    function!("set", (String, LuaValue, Option<Table>), |h, _lua, (member, value, options)| {
+    function!("set", (String, LuaValue, Option<Table>), |h, lua, (member, value, options)| {
         let (session, value) = (session(h)?, values::from_lua(&value)?);
         let options = OptionFields::of("set", options, &["force", "within"])?;
         let (force, within) = (options.flag("force")?, options.number("within")?);
@@ -280,7 +252,7 @@ fn install(lua: &Lua, host: &SharedHost) -> mlua::Result<()> {
         let request = set.map_err(|why| error(format!("{}: {}", why.message, why.help)))?;
         within.map_or(Ok(()), |within| waits::wait_done(h, request, within))
     });
-    function!("commit", Option<Table>, |h, _lua, options| {
+    function!("commit", Option<Table>, |h, lua, options| {
         let session = session(h)?;
         listen_anew(h, &session);
         session.request_on(LINE, Ask::Commit { force: force("commit", options)? }, "operator", false);
@@ -290,7 +262,7 @@ fn install(lua: &Lua, host: &SharedHost) -> mlua::Result<()> {
         let drift = session(h)?.drift(RECOVERY).ok_or_else(|| error("the platform could not be read"))?;
         values::to_lua(lua, &drift)
     });
-    function!("recover", String, |h, _lua, how| recover(h, &how));
+    function!("recover", String, |h, lua, how| recover(h, &how));
     function!("wait", LuaValue, |h, lua, seconds| {
         // Numbers of either kind, and texts that are numbers, as everywhere in Lua.
         let seconds = f64::from_lua(seconds, lua).map_err(|_| {
@@ -299,16 +271,16 @@ fn install(lua: &Lua, host: &SharedHost) -> mlua::Result<()> {
         let (clock, until, interrupt) = (clock(h), deadline(h, seconds)?, interrupt(h));
         interrupt.sleep(&clock, until)
     });
-    function!("wait_state", (String, f64), |h, _lua, (state, seconds)| waits::wait_state(h, &state, seconds));
-    function!("wait_answer", (String, f64), |h, _lua, (event, seconds)| waits::wait_answer(h, &event, seconds));
+    function!("wait_state", (String, f64), |h, lua, (state, seconds)| waits::wait_state(h, &state, seconds));
+    function!("wait_answer", (String, f64), |h, lua, (event, seconds)| waits::wait_answer(h, &event, seconds));
     function!("param", (String, LuaValue), |h, lua, (name, default)| parameters::param(h, lua, &name, default));
     function!("signal", String, |h, lua, text| seen::signal(h, lua, &text));
-    function!("sample", Table, |h, _lua, table| recordings::sample(h, table));
+    function!("sample", Table, |h, lua, table| recordings::sample(h, table));
     function!("expect", Table, |h, lua, table| figures::add(h, lua, table, true));
     function!("figure", Table, |h, lua, table| figures::add(h, lua, table, false));
-    function!("assert_running", String, |h, _lua, name| looks::assert_state(h, &name, "running"));
-    function!("assert_state", (String, String), |h, _lua, (name, state)| looks::assert_state(h, &name, &state));
-    function!("state", String, |h, _lua, name| Ok(looks::component_state(h, &name)?.map(|s| s.to_string())));
+    function!("assert_running", String, |h, lua, name| looks::assert_state(h, &name, "running"));
+    function!("assert_state", (String, String), |h, lua, (name, state)| looks::assert_state(h, &name, &state));
+    function!("state", String, |h, lua, name| Ok(looks::component_state(h, &name)?.map(|s| s.to_string())));
     function!("property", String, |h, lua, name| looks::property(h, lua, &name));
     function!("port", String, |h, lua, name| looks::port(h, lua, &name));
     function!("system", (), |h, lua, ()| values::to_lua(lua, &looks::system(h)?));
@@ -318,32 +290,29 @@ fn install(lua: &Lua, host: &SharedHost) -> mlua::Result<()> {
     });
     function!("active", (), |h, lua, ()| lua.create_sequence_from(session(h)?.hub().active()));
     function!("log", Option<Table>, |h, lua, options| looks::log(h, lua, options));
-    function!("now", (), |h, _lua, ()| Ok(clock(h).now().as_secs_f64()));
-    function!("say", String, |h, _lua, text| {
+    function!("now", (), |h, lua, ()| Ok(clock(h).now().as_secs_f64()));
+    function!("say", String, |h, lua, text| {
         (h.borrow().options.say)(&text);
         Ok(())
     });
-    function!("fault", (String, String, Option<f64>, Option<f64>), |h, _lua, (step, how, times, takes)| {
+    function!("fault", (String, String, Option<f64>, Option<f64>), |h, lua, (step, how, times, takes)| {
         h.borrow_mut().faults.add(&step, &how, times, takes)
     });
     type Injected = (String, String, Option<LuaValue>, Option<f64>);
     function!("inject", Injected, |h, lua, (component, what, with, at)| {
         inject::inject(h, lua, &component, &what, with, at)
     });
-    function!("fail", String, |h, _lua, component| {
+    function!("fail", String, |h, lua, component| {
         session(h)?;
         h.borrow().faults.fail(&component)
     });
-    function!("shutdown", Option<Table>, |h, _lua, options| deploying::shutdown(h, force("shutdown", options)?));
+    function!("shutdown", Option<Table>, |h, lua, options| deploying::shutdown(h, force("shutdown", options)?));
     // A name that is no function of ours is a typo: say so where it stands, instead of "a nil value".
     let meta = lua.create_table()?;
     meta.set(
         "__index",
         lua.create_function(|_, (_, name): (Table, String)| -> mlua::Result<LuaValue> {
-            Err(error(format!(
-                "`{name}` is not defined: {}",
-                did_you_mean(&name, "functions", FUNCTIONS.iter().copied())
-            )))
+            Err(error(format!("`{name}` is not defined: {}", did_you_mean(&name, "functions", arguments::functions()))))
         })?,
     )?;
     globals.set_metatable(Some(meta))

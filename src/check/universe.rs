@@ -129,8 +129,16 @@ impl Universe {
 
     /// The finding that nothing creates a component of that name.
     pub fn unknown(&self, component: ComponentName, at: Origin) -> Finding {
-        let mut known: Vec<&str> = self.components.keys().map(ComponentName::as_str).collect();
+        // Those of the same file, and its subsystems, which a parent knows by their names.
+        let name = component.as_str();
+        let file = name.rfind('/').map_or("", |end| &name[..=end]);
+        let here = |other: &'static str| {
+            let own = other.strip_prefix(file)?;
+            Some(&other[..file.len() + own.find('/').unwrap_or(own.len())])
+        };
+        let mut known: Vec<&str> = self.components.keys().map(ComponentName::as_str).filter_map(here).collect();
         known.sort_unstable();
+        known.dedup();
         Finding::error(UNKNOWN_COMPONENT, format!("no configuration creates a component `{component}`"))
             .at(at)
             .labelled("no such component")

@@ -230,6 +230,8 @@ impl Following {
     /// It does not, and why.
     pub fn goes_on(&self, far: Far) -> Result<(), Halt> {
         if self.interrupted.load(Ordering::Relaxed) {
+            self.bar.set_message("working out what was found so far; Ctrl-C again ends at once");
+            self.bar.tick();
             return Err(Halt::Interrupted);
         }
         let over = |most: u64| taken_up().is_some_and(|bytes| bytes > most);

@@ -221,10 +221,15 @@ impl Table {
 impl Display for Table {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let columns = self.rows.iter().map(Vec::len).max().unwrap_or(0);
-        let widths: Vec<usize> = (0..columns)
-            .map(|i| self.rows.iter().filter_map(|r| r.get(i)).map(|c| width(c)).max().unwrap_or(0))
-            .collect();
         let terminal = terminal_columns();
+        // On a terminal one wide cell does not push away what stands behind it in all other rows.
+        let most = terminal.map_or(usize::MAX, |columns| columns / 3);
+        let widths: Vec<usize> = (0..columns)
+            .map(|i| {
+                let cells = self.rows.iter().filter_map(|r| r.get(i)).map(|c| width(c));
+                cells.filter(|cell| *cell <= most).max().unwrap_or(0)
+            })
+            .collect();
         for row in &self.rows {
             let mut line = " ".repeat(self.indent);
             for (i, (cell, wide)) in row.iter().zip(&widths).enumerate() {
@@ -236,7 +241,16 @@ impl Display for Table {
                     line.push_str(inside.trim());
                 } else {
                     line.push_str(cell);
-                    line.push_str(&" ".repeat(wide - width(cell) + 2));
+                    let last = row[i + 1..].iter().all(String::is_empty);
+                    match wide.checked_sub(width(cell)) {
+                        Some(left) => line.push_str(&" ".repeat(left + 2)),
+                        None if last => {}
+                        // The rest of the row goes on below.
+                        None => {
+                            writeln!(f, "{}", line.trim_end())?;
+                            line = " ".repeat(at + wide + 2);
+                        }
+                    }
                 }
             }
             writeln!(f, "{}", line.trim_end())?;

@@ -35,7 +35,7 @@ pub(super) fn draw(diagram: &mut Diagram, chart: &Statechart, active: &[String],
     drawing.state_content(&chart.root, ROOT, parent);
     drawing.transitions(&chart.root, ROOT);
     for edge in &mut diagram.edges[first..] {
-        edge.label = fold(&edge.label);
+        (edge.label, edge.whole) = fold(&edge.label);
     }
 }
 
@@ -73,7 +73,7 @@ impl Drawing<'_> {
                     } else {
                         Shape::Group
                     };
-                    node.lines = state_lines(inner);
+                    (node.lines, node.whole) = state_lines(inner);
                     if self.active.contains(&name) {
                         node.tone = Tone::Active;
                     }
@@ -146,7 +146,8 @@ fn actions(what: &str, actions: &[(Action, crate::model::Origin)]) -> Option<Str
     (!actions.is_empty()).then(|| format!("{what} / {}", raised(actions).join(", ")))
 }
 
-fn state_lines(state: &State) -> Vec<String> {
+/// What a state does, and the same whole where it is cut.
+fn state_lines(state: &State) -> (Vec<String>, Vec<String>) {
     let mut lines: Vec<String> = Vec::new();
     lines.extend(actions("entry", &state.entry));
     if !state.config.is_empty() {
@@ -157,7 +158,9 @@ fn state_lines(state: &State) -> Vec<String> {
         lines.push("doo / function".to_owned());
     }
     lines.extend(actions("exit", &state.exit));
-    lines.iter().map(|l| short(l, 48)).collect()
+    let shown: Vec<String> = lines.iter().map(|l| short(l, 48)).collect();
+    let whole = if shown == lines { Vec::new() } else { lines };
+    (shown, whole)
 }
 
 /// Each event of a transition, the last with its priority and what the transition raises. Of one out of a connector nothing is
@@ -193,9 +196,10 @@ fn transition_lines(transition: &ChartTransition, connector: bool) -> Vec<String
     lines
 }
 
-/// Events as few lines, and how many more there are.
-pub(super) fn fold(events: &[String]) -> Vec<String> {
+/// Events as few lines, and how many more there are; and all of them whole, where something of them is not there.
+pub(super) fn fold(events: &[String]) -> (Vec<String>, Vec<String>) {
     let mut lines: Vec<String> = Vec::new();
+    let mut cut = events.iter().any(|event| short(event, LABEL_COLUMNS) != *event);
     for (i, event) in events.iter().enumerate() {
         let last = i + 1 == events.len();
         let text = format!("{}{}", short(event, LABEL_COLUMNS), if last { "" } else { "," });
@@ -207,12 +211,13 @@ pub(super) fn fold(events: &[String]) -> Vec<String> {
             }
             _ if full => {
                 lines.push(format!("… {} more", events.len() - i));
+                cut = true;
                 break;
             }
             _ => lines.push(text),
         }
     }
-    lines
+    (lines, if cut { events.to_vec() } else { Vec::new() })
 }
 
 #[cfg(test)]

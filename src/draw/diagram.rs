@@ -66,6 +66,8 @@ pub struct DiagramNode {
     pub title: String,
     /// Smaller text below the heading.
     pub lines: Vec<String>,
+    /// Heading and text whole, where they are cut.
+    pub whole: Vec<String>,
     /// Its colour.
     pub tone: Tone,
     /// In-ports, top to bottom.
@@ -94,6 +96,8 @@ pub struct DiagramEdge {
     pub to_port: Option<usize>,
     /// Lines of text on it.
     pub label: Vec<String>,
+    /// That text whole, where it is cut.
+    pub whole: Vec<String>,
     /// Whether it is drawn dashed.
     pub dashed: bool,
 }
@@ -101,7 +105,7 @@ pub struct DiagramEdge {
 impl DiagramEdge {
     /// A plain edge between two nodes.
     pub fn new(from: usize, to: usize) -> Self {
-        Self { from, from_port: None, to, to_port: None, label: Vec::new(), dashed: false }
+        Self { from, from_port: None, to, to_port: None, label: Vec::new(), whole: Vec::new(), dashed: false }
     }
 
     /// Whether it is about ports: it leaves at the side of the out-ports and comes in at that of the in-ports, whichever way it runs.

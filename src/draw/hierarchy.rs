@@ -120,9 +120,11 @@ fn arrows(diagram: &mut Diagram, from: usize, to: usize, chart: &Statechart, sub
         let names: BTreeSet<&str> = events.iter().filter_map(own).collect();
         fold(&names.into_iter().map(str::to_owned).collect::<Vec<_>>())
     };
-    for (from, to, label, dashed) in [(from, to, of(chart.raised()), false), (to, from, of(chart.waited_for()), true)] {
+    for (from, to, (label, whole), dashed) in
+        [(from, to, of(chart.raised()), false), (to, from, of(chart.waited_for()), true)]
+    {
         if !label.is_empty() {
-            diagram.edges.push(DiagramEdge { label, dashed, ..DiagramEdge::new(from, to) });
+            diagram.edges.push(DiagramEdge { label, whole, dashed, ..DiagramEdge::new(from, to) });
         }
     }
 }

@@ -66,7 +66,8 @@ fn lanes(diagram: &mut Diagram, group: usize, steps: &[PlannedStep], said: &dyn 
             }
             lane
         });
-        let mut node = DiagramNode::new(format!("step{}", diagram.nodes.len()), short(&said(&step.step), 46));
+        let title = said(&step.step);
+        let mut node = DiagramNode::new(format!("step{}", diagram.nodes.len()), short(&title, 46));
         node.parent = Some(lane);
         node.tone = match step.reversibility {
             Reversibility::Exact => Tone::Good,
@@ -78,7 +79,14 @@ fn lanes(diagram: &mut Diagram, group: usize, steps: &[PlannedStep], said: &dyn 
             node.lines.push("cannot be undone".to_owned());
         } else if !undo.is_empty() {
             let moving = if step.undo_moves { " (moves)" } else { "" };
-            node.lines.push(short(&format!("undo: {}", undo.join("; ")), 54 - moving.len()) + moving);
+            let back = format!("undo: {}", undo.join("; "));
+            node.lines.push(short(&back, 54 - moving.len()) + moving);
+            if !node.lines[0].starts_with(&back) {
+                node.whole = vec![title.clone(), back + moving];
+            }
+        }
+        if node.title != title && node.whole.is_empty() {
+            node.whole = vec![title];
         }
         nodes.insert(step.id, diagram.add(node));
         for after in &step.after {

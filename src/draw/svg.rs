@@ -80,7 +80,9 @@ pub(super) fn write(diagram: &Diagram) -> String {
     }
     for (edge, route) in diagram.edges.iter().zip(&routes) {
         if let Some(rect) = route.label.filter(|_| !edge.label.is_empty()) {
+            hover(&mut out, &edge.whole);
             draw_label(&mut out, &edge.label, rect, route.looped.is_some());
+            hover_end(&mut out, &edge.whole);
         }
     }
     out.push_str("</g>\n");
@@ -163,27 +165,42 @@ fn draw_node(out: &mut String, diagram: &Diagram, index: usize, r: Rect, depth: 
     }
 }
 
-/// The text at the top of a node. A group's is drawn over the edges that pass there, with a rim in the group's colour.
+/// Opens what has that text whole where a pointer rests on it.
+fn hover(out: &mut String, whole: &[String]) {
+    if !whole.is_empty() {
+        let _ = writeln!(out, "<g><title>{}</title>", xml(&whole.join(", ")));
+    }
+}
+
+/// Closes it.
+fn hover_end(out: &mut String, whole: &[String]) {
+    if !whole.is_empty() {
+        out.push_str("</g>\n");
+    }
+}
+
+/// The text at the top of a node. A group's is drawn over the edges that pass there, with a rim in the group's colour: below
+/// it, as a text of its own, since not all readers of SVG know another order of painting.
 fn draw_heading(out: &mut String, node: &DiagramNode, r: Rect, rim: Option<&str>) {
     let ink = colours(node.tone).2;
     let cx = r.x + r.w / 2.0;
-    let rim = rim.map_or_else(String::new, |c| format!(" stroke=\"{c}\" stroke-width=\"5\" paint-order=\"stroke\""));
-    let _ = writeln!(
-        out,
-        "<text x=\"{cx:.1}\" y=\"{:.1}\" font-size=\"{TITLE}\" font-weight=\"bold\" text-anchor=\"middle\" \
-         fill=\"{ink}\"{rim}>{}</text>",
-        r.y + 19.0,
-        xml(&node.title)
-    );
-    let mut y = r.y + 19.0;
-    for line in &node.lines {
-        y += LINE - 2.0;
+    let rim = rim.map(|c| format!("fill=\"{c}\" stroke=\"{c}\" stroke-width=\"5\" stroke-linejoin=\"round\""));
+    hover(out, &node.whole);
+    for paint in rim.into_iter().chain([format!("fill=\"{ink}\"")]) {
+        let mut y = r.y + 19.0;
         let _ = writeln!(
             out,
-            "<text x=\"{cx:.1}\" y=\"{y:.1}\" text-anchor=\"middle\" fill=\"{ink}\"{rim}>{}</text>",
-            xml(line)
+            "<text x=\"{cx:.1}\" y=\"{y:.1}\" font-size=\"{TITLE}\" font-weight=\"bold\" text-anchor=\"middle\" \
+             {paint}>{}</text>",
+            xml(&node.title)
         );
+        for line in &node.lines {
+            y += LINE - 2.0;
+            let _ =
+                writeln!(out, "<text x=\"{cx:.1}\" y=\"{y:.1}\" text-anchor=\"middle\" {paint}>{}</text>", xml(line));
+        }
     }
+    hover_end(out, &node.whole);
 }
 
 /// The fill of a group: its tone's, or that of its depth.

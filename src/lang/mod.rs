@@ -37,4 +37,5 @@ pub use load::{
     Loaded, LoadedConfigurations, LoadedCoordinator, LoadedMonitors, load, load_configurations, load_coordinator,
     load_from, load_monitors,
 };
+pub use slips::key_again;
 pub use texts::LoadOptions;

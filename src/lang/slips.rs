@@ -82,6 +82,15 @@ pub fn twice(cx: &mut Cx, file: FileId, text: &str) -> Findings {
     again.iter().map(finding).collect()
 }
 
+/// Of a text that nothing is told of by places: the first key that stands twice, with its line before it.
+pub fn key_again(text: &str) -> Option<String> {
+    let again = keys_again(&tokens(text)).into_iter().next()?;
+    let (line, first, key) = (again.again.line, again.first.line, again.key);
+    Some(format!(
+        "{line}: `{key}` stands twice in one table, first on line {first}, and Lua keeps the last: {KEEP_ONE}"
+    ))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

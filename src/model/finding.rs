@@ -177,9 +177,26 @@ pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Opti
             let last = candidate.rsplit_once('.').filter(|_| !name.contains('.')).map(|(_, last)| last);
             std::iter::once(candidate).chain(last).map(move |part| (near(part), candidate))
         })
-        .filter(|((_, score, _), _)| *score > 0.8)
+        .filter(|((_, score, _), candidate)| *score > 0.8 || is_short_for(name, candidate))
         .min_by(|(a, one), (b, other)| a.0.cmp(&b.0).then(b.2.total_cmp(&a.2)).then(one.cmp(other)))
         .map(|(_, candidate)| candidate)
+}
+
+/// Whether two letters of a short word stand the other way round (`scr`), or one without vowels is written out (`target`, of `tgt`).
+fn is_short_for(name: &str, candidate: &str) -> bool {
+    let sorted = |word: &str| {
+        let mut letters: Vec<char> = word.chars().collect();
+        letters.sort_unstable();
+        letters
+    };
+    let swapped = || sorted(name) == sorted(candidate) && strsim::osa_distance(name, candidate) == 1;
+    let written_out = || {
+        let mut letters = name.chars().peekable();
+        letters.peek().copied() == candidate.chars().next()
+            && !candidate.contains(['a', 'e', 'i', 'o', 'u'])
+            && candidate.chars().all(|wanted| letters.any(|letter| letter == wanted))
+    };
+    candidate.len() > 2 && (swapped() || written_out())
 }
 
 /// Which of two words was meant, where it must be one of them: the one with fewer slips of the finger, else the first.
@@ -252,5 +269,8 @@ mod tests {
         assert_eq!(nearest("run.udno", ["run", "run.undo"]), Some("run.undo"));
         assert_eq!(nearest("other.Winch", known), None);
         assert_eq!(nearest("arm", ["arm"]), None, "itself is no help");
+        let keys = ["src", "tgt", "events", "pn"];
+        let meant = ["scr", "target", "source", "tagret", "pen", "guard"].map(|name| nearest(name, keys));
+        assert_eq!(meant, [Some("src"), Some("tgt"), Some("src"), None, None, None]);
     }
 }

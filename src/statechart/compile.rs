@@ -7,7 +7,7 @@ mod tables;
 
 use super::chart::{ActionOp, Chart, EventId, NONE, NodeKind, RaiseSite};
 use super::reactions::ReactionTable;
-use super::resolve::ResolvedNames;
+use super::resolve::{ResolvedNames, is_meant_initial};
 use super::wide::Wide;
 use super::{Machine, checks};
 use crate::limits;
@@ -76,11 +76,17 @@ struct ChartBuilder<'m> {
 const RESERVED: [&str; 3] = ["type", "new", "rfsm"];
 const RESERVED_IN_ROOT: [&str; 6] = ["err", "warn", "info", "dbg", "getevents", "idle_hook"];
 
+/// Whether a transition in it begins at a misspelt `initial`, which is told there.
+fn misspells_initial(state: &State) -> bool {
+    let of = |transition: &ChartTransition| transition.src.as_ref().is_some_and(|(text, _)| is_meant_initial(text));
+    !state.children.iter().any(|child| child.name().as_str() == INITIAL) && state.transitions.iter().any(of)
+}
+
 impl<'m> ChartBuilder<'m> {
     fn walk_root(&mut self, root: &'m State) {
         let node = self.add(Ident::new(ROOT).expect("`root` is a name"), NONE, 0, NodeKind::Composite, root.origin);
         self.walk(root, node, 0);
-        if !self.children.contains_key(&(node, initial())) {
+        if !self.children.contains_key(&(node, initial())) && !misspells_initial(root) {
             self.findings.push(
                 Finding::error(codes::CHART_NO_INITIAL, "the coordinator does not say in which state it begins")
                     .at(root.origin)
@@ -89,8 +95,9 @@ impl<'m> ChartBuilder<'m> {
                         "write a transition from `initial` to the first state: `trans { src = \"initial\", tgt = … }`",
                     ),
             );
-        } else if self.kinds[self.children[&(node, initial())] as usize] != NodeKind::Connector {
-            let at = self.children[&(node, initial())];
+        } else if let Some(&at) = self.children.get(&(node, initial()))
+            && self.kinds[at as usize] != NodeKind::Connector
+        {
             self.findings.push(
                 Finding::error(codes::CHART_INITIAL_STATE, "`initial` of the root is a state, not a connector")
                     .at(self.origins[at as usize])
@@ -285,6 +292,9 @@ impl<'m> ChartBuilder<'m> {
         }
         if self.kinds[tgt as usize] == NodeKind::Composite {
             let Some(initial) = self.children.get(&(tgt, initial())).copied() else {
+                if self.states[tgt as usize].is_some_and(misspells_initial) {
+                    return;
+                }
                 let target = self.fqn(tgt);
                 let origin = transition.tgt.as_ref().map_or(transition.origin, |(_, origin)| *origin);
                 self.findings.push(

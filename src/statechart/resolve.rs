@@ -26,6 +26,11 @@ pub(super) struct Unresolved {
     pub help: String,
 }
 
+/// Whether a name that is not there is `initial`, misspelt.
+pub fn is_meant_initial(name: &str) -> bool {
+    finding::nearest(name, [INITIAL]).is_some()
+}
+
 impl ResolvedNames<'_> {
     pub fn child(&self, state: u32, name: &str) -> Option<u32> {
         self.children.get(&(state, Ident::new(name).ok()?)).copied()
@@ -91,6 +96,8 @@ impl ResolvedNames<'_> {
                 format!("write a transition with `src = \"initial\"` in `{here}`, so that it has an initial connector")
             }
             (None, Some(node)) => format!("there is one elsewhere: write `{}`", self.fqn(node)),
+            // What is misspelt may be what makes it be there.
+            (None, None) if is_meant_initial(name) => format!("did you mean `{INITIAL}`?"),
             _ => finding::did_you_mean(name, "nodes", known),
         };
         Unresolved { message, help }

@@ -6,6 +6,7 @@
 //!   block `console` behind it is printed.
 //! * `check: FILE`: a file of examples/pair but for its comments, which is accepted so, and with which the story there ends well.
 //! * `part of: FILE`: lines of a file of examples/pair.
+//! * `file: FILE`: a file of this project, whole.
 //! * `types`: what a deployment may have under `types`.
 //! * `console: FILE`: what commands print while that file of examples/pair is deployed, but for times.
 
@@ -67,6 +68,11 @@ fn done(mark: &str, text: &str) -> String {
             for line in text.lines().map(str::trim) {
                 assert!(lines.any(|own| own == line), "`{line}` does not stand in {of}, or not there");
             }
+            String::new()
+        }
+        "file" => {
+            let file = std::fs::read_to_string(format!("{ROOT}/{of}")).expect("the file");
+            assert_eq!(text, file, "{of}");
             String::new()
         }
         "types" => {
@@ -133,6 +139,11 @@ fn executed(guide: &str, may_be_unmarked: bool) -> usize {
 #[test]
 fn the_blocks_on_scripts() {
     assert!(executed("scripts", true) > 4);
+}
+
+#[test]
+fn the_blocks_on_coordinators() {
+    assert!(executed("coordinators", true) > 0);
 }
 
 #[test]

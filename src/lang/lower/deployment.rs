@@ -127,7 +127,11 @@ pub fn draft(cx: &mut Cx, node: Node, file_name: &str) -> Option<Draft> {
     let types = fields.take(cx, "types").map(|node| types::types(cx, node));
     if !named && types.is_none() && !fields.misspelt("types") {
         let row = fields.row("libraries");
-        let _ = fields.needed(cx, "libraries", |_, _| format!("add `{}`", row.example));
+        let composed = fields.has("subsystems");
+        let _ = fields.needed(cx, "libraries", |_, _| match composed {
+            true => "where all components are those of its subsystems, add `types: {}`".to_owned(),
+            false => format!("add `{}`, or types of your own under `types`", row.example),
+        });
     }
     let activities = fields.take(cx, "activities").map(|node| activities(cx, node)).unwrap_or_default();
     let configurations = files(cx, &mut fields, "configurations");
