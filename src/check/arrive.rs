@@ -193,10 +193,9 @@ impl Product<'_> {
     /// A batch comes to the desk.
     fn take_in(&mut self, mut state: ProductState, batch: &Batch, coming: &Coming) -> ProductState {
         // To come to *down* twice with nothing asked for in between is to come once.
-        let is_down = |batch: &Batch| batch.requests.first().is_some_and(|request| request.why == Why::Down);
         let same =
             |other: &&Batch| other.requests.first().map(|r| r.requester) == batch.requests.first().map(|r| r.requester);
-        if is_down(batch) && state.desk.waiting().filter(same).last().is_some_and(is_down) {
+        if batch.is_down() && state.desk.waiting().filter(same).last().is_some_and(Batch::is_down) {
             return state;
         }
         let before = std::mem::replace(&mut state.desk, coming.desk.clone());
@@ -336,7 +335,7 @@ impl Product<'_> {
             let begun = state.desk.clone();
             let Some(ActiveBatch { batch, .. }) = begun.active(number) else { continue };
             let first = batch.requests[0];
-            if first.why != Why::Down {
+            if !batch.is_down() {
                 for request in &batch.requests {
                     self.owed(state, request);
                 }

@@ -178,8 +178,7 @@ impl Desks {
             .filter(|active| batch.requests.iter().any(|undo| given_up_of(undo, &active.batch.requests).is_some()));
         let about: SmallVec<[u32; 2]> = of.map(|active| active.number).collect();
         // Who stands in the queue as down may be taken up before a safe configuration makes everything wait.
-        let is_down = |batch: &Batch| batch.requests.first().is_some_and(|request| request.why == Why::Down);
-        let meddles = !told.is_empty() || !about.is_empty() || !safe.is_empty() && desk.waiting().any(is_down);
+        let meddles = !told.is_empty() || !about.is_empty() || !safe.is_empty() && desk.waiting().any(Batch::is_down);
         Coming { desk: after, arrived: arrival.in_order().collect(), stops, about, meddles }
     }
 

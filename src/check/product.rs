@@ -22,6 +22,7 @@ use super::members::{Member, hears_loss, members};
 use super::neighbours::ParentInterface;
 use super::offers::AllOffers;
 use super::outcome::{Comes, ConcurrentWork, EMPTY, Held, Went, WorldId};
+use super::reactions::Macrostep;
 use super::seldom::{SharedSeldom, Unconfirmed};
 use super::shared_list::SharedList;
 use super::state::{Failed, Move, Next, Nexts, ProductState, Reacts, bit, index, one};
@@ -239,7 +240,17 @@ impl<'a> Product<'a> {
             children: 0,
         };
         let mut states = one(state);
+        let all = entered.len();
         for (by, reaction) in entered.iter().enumerate() {
+            // Who begins in *down* while others are not there waits for nothing that these ask for.
+            let begins_down = matches!(&reaction.handed[..], [only] if only.is_down());
+            let marked = |state: &ProductState| (state.down | bit(by)).count_ones() as usize != all;
+            if begins_down && states.iter().all(marked) {
+                let reaction = Macrostep { handed: Vec::new(), ..reaction.clone() };
+                let down = |state: ProductState| ProductState { down: state.down | bit(by), ..state };
+                states = states.into_iter().flat_map(|state| self.follow(down(state), by, &reaction)).collect();
+                continue;
+            }
             states = states.into_iter().flat_map(|state| self.follow(state, by, reaction)).collect();
         }
         // What several may come to is what one of them comes to a moment later; what is told at the start is told before anybody listens.

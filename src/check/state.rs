@@ -96,7 +96,7 @@ impl ProductState {
         let under_way = self.desk.under_way().iter().map(|active| &active.batch);
         let (mut downs, mut batches) = (0_usize, 0);
         for batch in under_way.chain(self.desk.waiting()).filter(first) {
-            *(if batch.requests[0].why == Why::Down { &mut downs } else { &mut batches }) += 1;
+            *(if batch.is_down() { &mut downs } else { &mut batches }) += 1;
         }
         let due = usize::from(self.is_owed(by));
         let safe = self.safe.iter().filter(|request| request.requester == by).count();

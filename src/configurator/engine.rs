@@ -292,11 +292,7 @@ impl Engine {
             UrgentCommand::Hurry => {}
             // It is no defect of the place it comes from.
             UrgentCommand::Panic => resume_unwind(Box::new("a panic was injected".to_owned())),
-            // Stands in its coordinator's queue like a request.
-            UrgentCommand::Down(requester) => {
-                let request = Request { why: Why::Down, ..Request::new(RequestId(0), Ask::Undo, requester) };
-                let _ = self.desk.arrive(Batch::one(request), |_| false, &self.given.claims);
-            }
+            UrgentCommand::Down { coordinator, begins } => self.told_down(coordinator, begins),
         }
     }
 
@@ -374,30 +370,6 @@ impl Engine {
     pub fn number(&mut self) -> u64 {
         self.numbers += 1;
         self.numbers
-    }
-
-    /// What was in force in one life of a subsystem is not in force in the next: where all of its coordinators are down and nothing is left
-    /// of it, its frames are dropped.
-    pub fn empty_subsystems(&mut self) {
-        let down = |all: &[Requester]| all.iter().all(|one| self.down.contains(one));
-        let down: Vec<Ident> =
-            self.given.subsystems.iter().filter(|(_, all)| down(all)).map(|(path, _)| *path).collect();
-        let busy = self.held_frames();
-        for path in down {
-            if self.world.settle_down_in(path, &busy) {
-                self.counts.leads(path, false);
-                self.forget_confirmations();
-                self.changed();
-                if let Some(progress) = &self.given.progress {
-                    progress(&Progress::Emptied(path));
-                }
-            }
-        }
-    }
-
-    /// Whether all coordinators are down.
-    pub fn all_down(&self) -> bool {
-        self.given.coordinators.iter().all(|coordinator| self.down.contains(coordinator))
     }
 
     /// A request makes room in the queue and is owed an answer.

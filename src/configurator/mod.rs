@@ -24,6 +24,7 @@ pub mod conditions;
 mod confirmations;
 pub mod control;
 mod defining;
+mod down;
 mod engine;
 mod fast;
 mod handle;

@@ -95,17 +95,7 @@ impl Engine {
                 continue;
             }
             if group.down {
-                self.down.insert(requests[0].requester);
-                // Who asks on is led anew since, and may be led down anew.
-                if self.all_down() && !self.desk.asks_on() {
-                    self.counts.leaving.store(false, std::sync::atomic::Ordering::Release);
-                    self.leaves(false);
-                }
-                self.empty_subsystems();
-                if self.all_down() && self.world.settle_down() {
-                    self.confirmations.clear();
-                    self.changed();
-                }
+                self.is_taken_up_as_down(requests[0].requester);
                 self.forget(requests[0]);
                 group.told.clear();
                 if self.desk.answered(number, 0, None).over {

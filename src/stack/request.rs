@@ -126,6 +126,11 @@ impl Batch {
         Self { requests: SmallVec::from_iter([request]) }
     }
 
+    /// Whether it is no request, but that a coordinator has come to its *down* state.
+    pub fn is_down(&self) -> bool {
+        self.requests.first().is_some_and(|request| request.why == Why::Down)
+    }
+
     /// Brings the requests into the order in which they are carried out.
     pub fn arrange(&mut self) {
         self.requests.sort_by_key(|request| !request.ask.is_undo());
