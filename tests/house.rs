@@ -286,7 +286,7 @@ fn needs(room: &str, has: bool) -> BTreeMap<String, BTreeSet<String>> {
 
 #[test]
 fn no_files_go_round_in_a_circle() {
-    let free = ["check", "configurator", "diagnostics", "functions", "monitor", "platform"];
+    let free = ["check", "configurator", "diagnostics", "functions", "monitor"];
     let rooms = free.map(|room| (room, false)).into_iter().chain([("stack", true), ("transaction", true)]);
     for (room, has) in rooms {
         let mut needs = needs(room, has);

@@ -7,7 +7,7 @@ use super::kept::{KeptValue, KeptValues};
 use super::shared_list::SharedList;
 use crate::model::{ConfigId, Verdict};
 use crate::stack::claims::Claims;
-use crate::stack::{Arrival, Arrived, Batch, Desk, Gone, Request, Requester, Why, given_up_of};
+use crate::stack::{Arrival, Arrived, Batch, Desk, Gone, Request, Requester, given_up_of};
 use crate::statechart::NodeId;
 use rustc_hash::FxHashMap;
 use smallvec::SmallVec;

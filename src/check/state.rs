@@ -6,7 +6,7 @@ use super::seldom::{Interrupted, Seldom, SharedSeldom};
 use super::shared_list::SharedList;
 use crate::model::codes::{STACK_EMPTY, STACK_NO_FRAME};
 use crate::model::{Ask, ComponentName, ConfigId, EventName, Findings, Verdict};
-use crate::stack::{Batch, Request, Requester, Why};
+use crate::stack::{Batch, Request, Requester};
 use crate::statechart::{EventId, NodeId};
 use smallvec::SmallVec;
 use std::ops::Deref;

@@ -258,7 +258,7 @@ impl Following {
             let so_far = self.budget.so_far(states, far.transitions);
             self.bar.set_message(match self.signals.is_empty() {
                 true => format!("checking: {so_far}; {rate} states/s"),
-                false => format!("Ctrl-C tells what was found so far; following: {so_far}; {rate} states/s"),
+                false => format!("following: {so_far}; {rate} states/s; Ctrl-C tells what was found so far"),
             });
             self.bar.tick();
         }

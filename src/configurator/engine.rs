@@ -12,7 +12,7 @@ use super::running::{Purpose, Running};
 use super::safety::Safety;
 use super::suspects::Suspects;
 use super::switches::Fast;
-use crate::model::{Ask, ConfigId, Configuration, DeploymentLimits, Ident, RequestId, Snapshot, Verdict};
+use crate::model::{Ask, ConfigId, Configuration, DeploymentLimits, Ident, Snapshot, Verdict};
 use crate::plan::PlanContext;
 use crate::platform::{Platform, PlatformEvent};
 use crate::stack::claims::Claims;

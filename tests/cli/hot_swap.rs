@@ -553,7 +553,7 @@ fn what_cannot_be_replaced_is_told_where_it_is_written() {
             format!("replace('ctrl', 'Mcp', {{ {FITS} }}),"),
             "conf::unknown_type",
             "there is no component type `Mcp`",
-            "known component types: `Mpc`, `Pid`, `Plant`",
+            "did you mean `Mpc`?",
         ),
         (
             format!("replace('ctlr', 'Mpc', {{ {FITS} }}),"),

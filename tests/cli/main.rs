@@ -44,6 +44,7 @@ mod stalled;
 mod stopping;
 mod sweeping;
 mod together;
+mod told;
 #[path = "../lang/tongue.rs"]
 mod tongue;
 mod unasked;

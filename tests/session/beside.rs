@@ -133,6 +133,22 @@ impl Run {
     }
 }
 
+/// That a coordinator begins in *down* stands in nobody's way, nor waits for what another one asks for.
+#[test]
+fn both_come_up_in_the_time_of_one() {
+    let own = configurations(|name| if name == "arm" { "armDrive" } else { "gripperDrive" });
+    let slow = |component: &str| format!("{{ step: configure {component}, how: slow, times: 1, takes_s: 0.8 }}");
+    let faults = format!("{HOLDS}faults: [{}, {}]\n", slow("armDrive"), slow("gripperDrive"));
+    let others = [("conf.lua", &*own), ("arm.lua", &holder("arm")), ("gripper.lua", &holder("gripper"))];
+    Run::with(&accepted(&faults, &others), |run| {
+        run.session.bring_up().unwrap();
+        assert_eq!(run.session.status().at, 0.8);
+        assert!(run.session.take_down(false).is_orderly());
+        // In force is nothing of it.
+        assert!(run.frames().is_empty());
+    });
+}
+
 #[test]
 fn each_comes_up_undoes_its_own_and_goes_down() {
     let checked = two();

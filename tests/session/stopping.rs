@@ -104,7 +104,7 @@ impl Small {
         // It is about a coordinator that does not do what `check` demands.
         let read = app::read(&folder.path().join("d.yaml"), &LoadOptions::default(), libraries::builtin());
         let checked = read
-            .and_then(|read| app::check_while(read, true, &|| true))
+            .and_then(|read| app::check_while(read, true, &|_| Ok(())))
             .unwrap_or_else(|refused| panic!("{:#?}", refused.findings));
         let clock = Clock::simulated();
         let guard = clock.enter();
