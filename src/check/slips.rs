@@ -6,6 +6,9 @@ use crate::model::finding::{closest, did_you_mean, nearest};
 use crate::model::{Deployment, EventName, FAULTED, Finding, Monitor, Raise};
 use std::collections::BTreeSet;
 
+/// What a state hears when what is in it has come to its end.
+const DONE: &str = "e_done";
+
 /// What is known of events of a deployment.
 pub struct KnownEvents<'a> {
     deployment: &'a Deployment,
@@ -75,6 +78,12 @@ impl<'a> KnownEvents<'a> {
                 Finding::warning(COORD_NEAR_EVENT, message).help(format!("did you mean `{component}{FAULTED}`?")),
             );
         }
+        if let Some((component, word)) = event.rsplit_once('.').filter(|(component, _)| created.contains(component))
+            && self.is_known(word)
+        {
+            let message = format!("`{event}` never comes: what `{component}` raises is heard without its name");
+            return Some(Finding::warning(COORD_NEAR_EVENT, message).help(format!("did you mean `{word}`?")));
+        }
         let component = event.strip_suffix(FAULTED)?;
         (!created.contains(component)).then(|| {
             Finding::warning(COORD_NEAR_EVENT, format!("`{event}` never comes: there is no component `{component}`"))
@@ -98,7 +107,12 @@ impl<'a> KnownEvents<'a> {
             return None;
         }
         let known = [&self.raised, &self.by_components, &self.accepted].into_iter().flatten();
-        let near = nearest(text, known.copied())?;
+        let near = nearest(text, known.copied().chain([DONE]))?;
+        if near == DONE {
+            let message = format!("`{event}` is nearly `{DONE}`, which says that what is in a state is done");
+            let help = format!("did you mean `{DONE}`? if not, a component or an operator must raise `{event}`");
+            return is_slip(text, DONE).then(|| Finding::warning(COORD_NEAR_EVENT, message).help(help));
+        }
         // Of what nobody hears it is said where it is raised, with what may have been meant; but a component's type is another file's.
         let is_heard = self.waited_for.iter().any(|event| event.as_str() == near);
         if !is_heard && !self.confirms.contains(near) && !self.by_components.contains(near) {

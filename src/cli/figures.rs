@@ -65,6 +65,13 @@ pub fn write_samples(folder: &Path, samples: &[ScriptSample]) -> CommandResult {
         let help = "name a folder that may be written with `--samples`; it is made where there is none";
         CommandFailure::usage(CLI_UNWRITABLE, format!("{}: {error}", path.display()), help)
     };
+    if samples.is_empty() {
+        super::output::error(&format!(
+            "note: nothing is written into {}: the script has recorded nothing (`sample`)\n",
+            folder.display()
+        ));
+        return Ok(Exit::Done);
+    }
     std::fs::create_dir_all(folder).map_err(|error| failed(folder, error))?;
     for sample in samples {
         let path = folder.join(format!("{}.csv", sample.name));

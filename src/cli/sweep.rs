@@ -198,7 +198,11 @@ fn show(out: &Output, axes: &[GridAxis], points: &[Vec<&str>], runs: &[PointRun]
     }
     out.text(table.to_string());
     let ok = runs.iter().filter(|run| run.end == PointEnd::Ok).count();
-    out.line(format!("{ok} of {} points are within their bounds", runs.len()));
+    out.line(match runs.len() {
+        1 if ok == 1 => "the one point is within its bounds".to_owned(),
+        1 => "the one point is not within its bounds".to_owned(),
+        all => format!("{ok} of {all} points are within their bounds"),
+    });
 }
 
 fn csv(axes: &[GridAxis], points: &[Vec<&str>], runs: &[PointRun], columns: &[(String, String)]) -> String {

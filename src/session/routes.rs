@@ -402,7 +402,12 @@ pub(super) fn on_answer(hub: &Hub, junction: &Junction, steps: &Steps, answer: &
 
 fn give(hub: &Hub, junction: &Junction, answer: &Answer, steps: Vec<StepTime>, class: Class) {
     let event = answer.event();
-    let reasons: Vec<String> = answer.findings().iter().map(|finding| finding.message.clone()).collect();
+    let mut reasons: Vec<String> = answer.findings().iter().map(|finding| finding.message.clone()).collect();
+    // What is broken is told with its cause, which is a finding of its own beside it.
+    let causes = reasons.clone();
+    reasons.retain(|one| {
+        !causes.iter().any(|whole| whole.strip_prefix(one.as_str()).is_some_and(|rest| rest.starts_with("; ")))
+    });
     hub.answered(LoggedAnswer {
         request: answer.request.id.0,
         ask: answer.request.ask.to_string(),

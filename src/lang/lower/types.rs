@@ -1,6 +1,6 @@
 //! Component types declared in a deployment.
 
-use super::{by_name, choice, condition, entries, name, own_name, text, value};
+use super::{by_name, choice, condition, entries, name, names, own_name, text, value};
 use crate::lang::grammar::{EFFECT, OPERATION, PORT, PROPERTY, TYPE};
 use crate::lang::tree::{Cx, Entry, Fields, Kind, Node};
 use crate::model::{
@@ -25,8 +25,8 @@ fn component_type(cx: &mut Cx, entry: Entry) -> Option<ComponentType> {
     ty.ports = members(cx, &mut fields, "ports", "u: { direction: in, type: float }", port);
     ty.properties = members(cx, &mut fields, "properties", "k: { type: float, default: 1.0 }", property);
     ty.operations = members(cx, &mut fields, "operations", "reset: { effect: none }", operation);
-    let raised: Vec<EventName> = fields.names(cx, "raises");
-    ty.raises = raised.into_iter().map(|event| (event, String::new())).collect();
+    let raised = names::<EventName>(cx, &mut fields, "raises", "`raises`");
+    ty.raises = raised.into_iter().map(|(event, _)| (event, String::new())).collect();
     ty.start_after = fields.names(cx, "start_after");
     ty.stop_before = fields.names(cx, "stop_before");
     ty.actuator = fields.truth(cx, "actuator").unwrap_or_default();
