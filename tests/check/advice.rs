@@ -153,6 +153,12 @@ fn a_slip_in_what_a_component_raises_is_told_by_its_type() {
     assert_eq!(told(&["e_arived"]), [slip]);
     assert_eq!(told(&["e_arrived", "e_arived"]), [slip], "where it is waited for elsewhere, too");
     assert!(told(&["e_arrived"]).is_empty());
+    let named = "`a.e_arrived` never comes: what `a` raises is heard without its name; did you mean `e_arrived`?";
+    assert_eq!(told(&["a.e_arrived"]), [named]);
+    for done in ["e_dne", "E_Done"] {
+        let said = told(&[done]);
+        assert!(said.len() == 1 && said[0].contains(&format!("`{done}` is nearly `e_done`")), "{said:?}");
+    }
     assert_eq!(told(&["e_axi2s_fell"]).len(), 1, "a number in another place is a slip");
     let small = Small::new(CONFIGURATIONS, STATES, "");
     small.demo.replace("small.yaml", "    operations:", "    raises: [e_arrived, run.ok]\n    operations:");
