@@ -1,5 +1,6 @@
 //! Whether every way leads down, and what it leaves behind.
 
+use super::children::Child;
 use super::closed::{fails, still_comes};
 use super::edges::{Barred, Edge};
 use super::explore::Graph;
@@ -57,6 +58,8 @@ impl Graph<'_, '_> {
         let deployment = self.product.deployment;
         let state = &self.states[at as usize];
         let finding = if let Some(finding) = self.is_down_alone(state) {
+            finding
+        } else if let Some(finding) = self.unknown_when_down() {
             finding
         } else if several {
             let message = format!("from {} no way leads down together", self.product.place(state));
@@ -265,6 +268,23 @@ impl Graph<'_, '_> {
                 "lead it down before, and wait for `{}` on the way there; else it is taken down by force",
                 first.down
             ));
+        Some(finding)
+    }
+
+    /// That a subsystem is down is heard nowhere, so that of no state it is known that all is down there.
+    fn unknown_when_down(&self) -> Option<Finding> {
+        let product = &*self.product;
+        let unheard = |child: &&Child| product.members.iter().all(|m| m.chart.event(child.down) == EventId::OTHER);
+        let events: Vec<String> =
+            product.children.iter().filter(unheard).map(|child| format!("`{}`", child.down)).collect();
+        let (last, before) = events.split_last()?;
+        let all = if before.is_empty() { last.clone() } else { format!("{} or {last}", before.join(", ")) };
+        let down = product.deployment.first_coordinator().down.as_str();
+        let message = format!("no transition waits for {all}: whether all is down in `{down}` is not known");
+        let finding = Finding::warning(COORD_NO_WAY_DOWN, message)
+            .at(product.deployment.key_origin("shutdown.down"))
+            .path("shutdown.down")
+            .help(format!("wait on the way to `{down}` until each subsystem is down"));
         Some(finding)
     }
 

@@ -155,3 +155,17 @@ fn a_parent_that_is_down_while_its_subsystem_is_up_is_warned_of() {
     let (told, _) = judged(led);
     assert!(!told.iter().any(|told| told.contains("`root.idle`")), "{told:?}");
 }
+
+/// A parent that does not wait until its subsystem is down is told that, and not that one of its states leads nowhere.
+#[test]
+fn a_parent_that_waits_for_no_down_is_told_which_to_wait_for() {
+    let waits = "trans { src = 'lowering', tgt = 'idle', events = { 'left/down' } },";
+    let goes = "trans { src = 'lowering', tgt = 'idle' },";
+    let told = with(&solo(&[("solo.lua", waits, goes)]), "coord::no_way_down", Severity::Warning);
+    assert!(
+        told.len() == 1
+            && told[0].starts_with("no transition waits for `left/down`: whether all is down in `idle` is not known")
+            && told[0].ends_with("wait on the way to `idle` until each subsystem is down"),
+        "{told:?}"
+    );
+}

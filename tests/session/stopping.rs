@@ -7,6 +7,7 @@ use davit::libraries;
 use davit::model::{Ask, ConfigId, RunState};
 use davit::platform::Platform;
 use davit::platform::simulated::{Delays, Fault, FaultRule, Faults, Simulated, SimulatedOptions, StepPattern};
+use davit::session::log::LogEntry;
 use davit::session::service::SessionService;
 use davit::session::socket::Service;
 use davit::session::{Command, Ended, Happening, Phase, Session, Stage, rpc};
@@ -342,6 +343,11 @@ fn what_nobody_attends_is_not_waited_for_and_stays() {
 fn an_emergency_on_the_way_down_stops_the_time() {
     let small = Small::up("lowering");
     small.after(1.0, |session| session.raise(event("e_estop"), "test"));
+    // Whoever looks at the terminal is told before the time of the stage would be over.
+    small.after(4.0, |session| {
+        let told = |entry: &&Arc<LogEntry>| matches!(&entry.what, Happening::Forced { note } if note.contains("nothing goes on before"));
+        assert_eq!(session.hub().log(usize::MAX).iter().filter(told).count(), 1);
+    });
     small.after(60.0, |session| {
         let status = session.status();
         let view = status.stopping.expect("it is being stopped");
