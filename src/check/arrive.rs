@@ -192,10 +192,10 @@ impl Product<'_> {
 
     /// A batch comes to the desk.
     fn take_in(&mut self, mut state: ProductState, batch: &Batch, coming: &Coming) -> ProductState {
-        // To come to *down* twice with nothing asked for in between is to come once.
+        // To come to *down* twice with nothing asked for in between, by anybody, is to come once.
         let same =
-            |other: &&Batch| other.requests.first().map(|r| r.requester) == batch.requests.first().map(|r| r.requester);
-        if batch.is_down() && state.desk.waiting().filter(same).last().is_some_and(Batch::is_down) {
+            |other: &Batch| other.requests.first().map(|r| r.requester) == batch.requests.first().map(|r| r.requester);
+        if batch.is_down() && state.desk.waiting().last().is_some_and(|last| last.is_down() && same(last)) {
             return state;
         }
         let before = std::mem::replace(&mut state.desk, coming.desk.clone());

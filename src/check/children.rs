@@ -2,6 +2,7 @@
 
 use super::belief::Beliefs;
 use super::reactions::{Macrostep, Reactions};
+use super::seldom_told::told_seldom;
 use super::state::ProductState;
 use crate::model::{Ask, ConfigId, Configuration, Deployment, EventName, Ident, Subsystem, SubsystemStanding};
 use crate::stack::{Requester, claims};
@@ -28,6 +29,8 @@ pub struct Child {
     pub holds: BTreeSet<String>,
     /// It may do so though nobody has begun it.
     pub unbidden: bool,
+    /// What it tells only where something has failed, or a monitor reports it.
+    pub seldom: BTreeSet<EventName>,
     /// What may be known of it; none: it may tell anything in any order.
     pub beliefs: Option<Beliefs>,
 }
@@ -50,7 +53,8 @@ impl Child {
             let (begins, down) = (own.deploy.event.within(path), SubsystemStanding::Down.event(path));
             let (holds, unbidden) = (subsystem.holds.clone(), !subsystem.holds.is_empty() && is_unbidden(subsystem));
             let (up, beliefs) = (SubsystemStanding::Up.event(path), None);
-            Self { path, begins, from, up, until, down, touching, holds, unbidden, beliefs }
+            let seldom = told_seldom(own).into_iter().map(|event| event.within(path)).collect();
+            Self { path, begins, from, up, until, down, touching, holds, unbidden, seldom, beliefs }
         };
         deployment.subsystems.iter().take(MOST_CHILDREN).map(of).collect()
     }

@@ -6,8 +6,9 @@ use super::edges::Barred;
 use super::from_outside::{FromOutside, Raises};
 use super::product::Product;
 use super::reactions::triggers;
+use super::seldom_told::fails;
 use super::state::{Move, ProductState};
-use crate::model::{Ask, EventName, FAULTED, Monitor, Verdict};
+use crate::model::{Ask, EventName, Monitor, Verdict};
 use crate::statechart::EventId;
 
 impl Product<'_> {
@@ -94,6 +95,9 @@ impl Product<'_> {
     fn may_raise(&self, name: EventName) -> Raises {
         let deployment = self.deployment;
         let simulated = deployment.kind.imitates;
+        if self.children.iter().any(|child| child.seldom.contains(&name)) {
+            return Raises::Sometimes;
+        }
         // What a subsystem tells nobody can refuse. That something fails nobody can promise, though they may tell it by hand.
         if self.is_told_by_child(name) || deployment.stays_open(name.as_str()) && !fails(name) {
             Raises::Somebody
@@ -106,11 +110,6 @@ impl Product<'_> {
             Raises::Perhaps
         }
     }
-}
-
-/// Whether an event tells that a component has failed.
-pub(super) fn fails(name: EventName) -> bool {
-    name.as_str().ends_with(FAULTED)
 }
 
 /// What to do about an event that is refused while the deployment is being stopped.

@@ -1,12 +1,13 @@
 //! Whether every way leads down, and what it leaves behind.
 
 use super::children::Child;
-use super::closed::{fails, still_comes};
+use super::closed::still_comes;
 use super::edges::{Barred, Edge};
 use super::explore::Graph;
 use super::judge::Traced;
 use super::members::Member;
 use super::product::Product;
+use super::seldom_told::fails;
 use super::state::{Failed, Move, ProductState};
 use crate::model::codes::{COORD_LEFTOVERS, COORD_NO_WAY_DOWN};
 use crate::model::{ComponentName, Finding, Severity};

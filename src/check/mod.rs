@@ -84,6 +84,7 @@ mod rounds;
 mod run;
 mod safety;
 mod seldom;
+mod seldom_told;
 mod settings;
 mod shape;
 mod shared_list;

@@ -169,3 +169,24 @@ fn a_parent_that_waits_for_no_down_is_told_which_to_wait_for() {
         "{told:?}"
     );
 }
+
+/// What a subsystem tells only when something fails in it need not come, as that something fails need not.
+#[test]
+fn what_is_told_of_a_failure_only_is_no_way_down() {
+    let leaves = "trans { src = 'on', tgt = 'leaving', events = { 'e_shutdown' } },";
+    let down = "trans { src = 'on', tgt = 'lowering', events = { 'e_shutdown', 'left/e_leaving' } },";
+    let waits = "trans { src = 'on', tgt = 'waiting', events = { 'e_shutdown' } }, waiting = state {},
+        trans { src = 'on', tgt = 'lowering', events = { 'left/e_leaving' } },
+        trans { src = 'waiting', tgt = 'lowering', events = { 'left/e_sick', 'left/e_leaving' } },";
+    let told = |effect: &str| {
+        let sick = format!("{leaves} {effect}");
+        let emits = ("arm.yaml", "emits: [e_built, e_leaving]", "emits: [e_built, e_leaving, e_sick]");
+        let changes = [emits, ("arm.lua", leaves, &*sick), ("solo.lua", down, waits)];
+        with(&solo(&changes), "coord::no_way_down", Severity::Warning)
+    };
+    let failed = told("trans { src = 'on', tgt = 'leaving', events = { 'arm.faulted' }, effect = { 'e_sick' } },");
+    assert!(failed.len() == 1 && failed[0].starts_with("from `root.waiting` only `left/e_sick`"), "{failed:?}");
+    // By itself it comes.
+    let by_itself = told("trans { src = 'on', tgt = 'leaving', events = { 'e_after(1)' }, effect = { 'e_sick' } },");
+    assert_eq!(by_itself, Vec::<String>::new());
+}
