@@ -111,7 +111,9 @@ impl<'a> KnownEvents<'a> {
         if near == DONE {
             let message = format!("`{event}` is nearly `{DONE}`, which says that what is in a state is done");
             let help = format!("did you mean `{DONE}`? if not, a component or an operator must raise `{event}`");
-            return is_slip(text, DONE).then(|| Finding::warning(COORD_NEAR_EVENT, message).help(help));
+            // `e_one` is a word.
+            let begins = text.get(..3).is_some_and(|begins| begins.eq_ignore_ascii_case(&DONE[..3]));
+            return (begins && is_slip(text, DONE)).then(|| Finding::warning(COORD_NEAR_EVENT, message).help(help));
         }
         // Of what nobody hears it is said where it is raised, with what may have been meant; but a component's type is another file's.
         let is_heard = self.waited_for.iter().any(|event| event.as_str() == near);

@@ -155,6 +155,7 @@ fn a_slip_in_what_a_component_raises_is_told_by_its_type() {
     assert!(told(&["e_arrived"]).is_empty());
     let named = "`a.e_arrived` never comes: what `a` raises is heard without its name; did you mean `e_arrived`?";
     assert_eq!(told(&["a.e_arrived"]), [named]);
+    assert!(told(&["e_one"]).is_empty(), "another word");
     for done in ["e_dne", "E_Done"] {
         let said = told(&[done]);
         assert!(said.len() == 1 && said[0].contains(&format!("`{done}` is nearly `e_done`")), "{said:?}");
