@@ -156,23 +156,35 @@ impl Graph<'_, '_> {
         let stale = (0u32..).zip(stale).filter(|(_, stale)| *stale).map(|(at, _)| at);
         let begun: Vec<u32> = stale.chain(begun).collect();
         let comes = self.spread_from(begun, |number, edge| stops(edge.to) && bars[number] != Some(Barred::Closed));
+        // Where nothing has failed what leads down by a failure alone, beside what may go well, is no way to count on.
+        let mut goes_well = vec![false; self.states.len()];
+        let well = self.edges.iter().filter(|edge| edge.failed() == Failed::Nothing && self.by(edge) == Move::Answer);
+        well.for_each(|edge| goes_well[edge.from as usize] = true);
+        let counts = |graph: &Self, edge: &Edge| {
+            let from = edge.from as usize;
+            edge.failed() == Failed::Nothing || graph.failed[from] != Failed::Nothing || !goes_well[from]
+        };
+        let mut before_well = self.reaching_down(|_, edge| counts(self, edge));
         for barred in [Barred::Again, Barred::Closed, Barred::Gone, Barred::Late, Barred::Reported] {
             // Where nothing is barred so, as much leads down as before.
             if !bars.contains(&Some(barred)) {
                 continue;
             }
             let after = self.reaching_down(|number, _| bars[number].is_none_or(|of| of > barred));
+            let open = |number: usize, edge: &Edge| bars[number].is_none_or(|of| of > barred) && counts(self, edge);
+            let after_well = self.reaching_down(open);
             let lost = |at: &u32| {
-                let state = &self.states[*at as usize];
-                let rests = state.stopping && state.is_at_rest() && comes[*at as usize];
-                rests && before[*at as usize] && !after[*at as usize]
+                let (state, at) = (&self.states[*at as usize], *at as usize);
+                let rests = state.stopping && state.is_at_rest() && comes[at];
+                let well = self.failed[at] == Failed::Nothing && before_well[at] && !after_well[at];
+                rests && (before[at] && !after[at] || well)
             };
             let some = (0..u32::try_from(self.states.len()).unwrap_or_default()).filter(lost).collect();
             if !(self.product.never_down && matches!(barred, Barred::Closed | Barred::Late)) {
                 let tell = |graph: &Self, at| graph.barred(at, barred, &bars, &before);
                 found_at(self, some, barred != Barred::Reported, &tell);
             }
-            before = after;
+            (before, before_well) = (after, after_well);
         }
         if !self.product.never_down {
             let slow = self.slow(&bars);
