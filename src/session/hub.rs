@@ -12,6 +12,7 @@ use super::writing::UnwrittenEvent;
 use crate::coordinator::{NotAccepted, Put};
 use crate::limits;
 use crate::model::{Ask, ConfigId, EventName, Raise, RequestId};
+use crate::stack::Requester;
 use crate::time::{Clock, Signal, Time, lock};
 use rustc_hash::{FxHashMap, FxHashSet};
 use std::collections::{BTreeMap, VecDeque};
@@ -67,7 +68,7 @@ pub(super) struct HubState {
     dropped_told: Option<Time>,
     /// Events of which somebody wants to know whether a transition hears them: by how many coordinators each is still to be
     /// taken up, and whether one heard it.
-    tickets: FxHashMap<u64, (usize, bool)>,
+    tickets: FxHashMap<u64, (usize, Vec<Requester>)>,
     /// The newest answers.
     answers: VecDeque<LoggedAnswer>,
     /// By coordinator: what its states are written with (`arm:`, or nothing), and its active ones.
@@ -209,22 +210,27 @@ impl Hub {
         let mut state = self.lock();
         let ticket = state.next;
         state.next += 1;
-        state.tickets.insert(ticket, (coordinators, false));
+        state.tickets.insert(ticket, (coordinators, Vec::new()));
         ticket
     }
 
-    /// A coordinator took such an event up (or cannot), and a transition heard it, or none did.
-    pub fn taken_up(&self, ticket: u64, heard: bool) {
-        if let Some((left, any)) = self.lock().tickets.get_mut(&ticket) {
+    /// A coordinator took such an event up (or cannot), and a transition of it `heard` it, or none did.
+    pub fn taken_up(&self, ticket: u64, heard: Option<Requester>) {
+        if let Some((left, all)) = self.lock().tickets.get_mut(&ticket) {
             *left = left.saturating_sub(1);
-            *any |= heard;
+            all.extend(heard);
         }
         self.outside.notify_all();
     }
 
     /// Whether a transition heard it, once all have taken it up.
     pub fn was_heard(&self, ticket: u64) -> Option<bool> {
-        self.lock().tickets.get(&ticket).filter(|(left, _)| *left == 0).map(|(_, heard)| *heard)
+        self.who_heard(ticket).map(|heard| !heard.is_empty())
+    }
+
+    /// The coordinators of which a transition heard it, once all have taken it up.
+    pub fn who_heard(&self, ticket: u64) -> Option<Vec<Requester>> {
+        self.lock().tickets.get(&ticket).filter(|(left, _)| *left == 0).map(|(_, heard)| heard.clone())
     }
 
     /// Nobody wants to know any more.

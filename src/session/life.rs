@@ -3,7 +3,7 @@
 use super::log::{Happening, Phase};
 use super::stages::Stage;
 use super::{Command, Session, Unanswered};
-use crate::model::Snapshot;
+use crate::model::{Ident, Snapshot};
 use crate::time::Time;
 use crate::time::clock::panic_text;
 use serde::{Deserialize, Serialize};
@@ -65,7 +65,14 @@ impl Session {
         let mut deadline = start + bring_up.within;
         let began = hub.heard();
         hub.set_phase(Phase::Deploying);
-        self.raise(bring_up.event, "deployment");
+        // Who does not hear it yet, while what was asked for at the beginning is not answered, is told once more then.
+        let mut ticket = match self.offer_watched(bring_up.event, "deployment") {
+            Ok(offered) => Some(offered.ticket),
+            Err(refused) => {
+                hub.note(Happening::Forced { note: format!("`{}` was not delivered: {refused}", bring_up.event) });
+                None
+            }
+        };
         let (mut force, mut unanswered) = (false, false);
         let why = loop {
             if let Some(Command::Shutdown { force: by_force }) = self.pending_command() {
@@ -79,8 +86,18 @@ impl Session {
                 break (format!("the coordinator is in `{state}`"), false);
             }
             if self.is_up() {
+                ticket.into_iter().for_each(|ticket| hub.forget(ticket));
                 hub.set_phase(Phase::Up);
                 return Ok(());
+            }
+            if let Some((heard, of)) = ticket.and_then(|of| Some((hub.who_heard(of)?, of))).filter(|_| self.is_still())
+            {
+                hub.forget(of);
+                ticket = None;
+                let unheard: Vec<Ident> = self.who_hears(bring_up.event, &heard).collect();
+                if !unheard.is_empty() && self.offer_to(bring_up.event, &unheard, "deployment").is_ok() {
+                    continue;
+                }
             }
             // Stopped in an emergency: what stopping it would move, nobody has asked for.
             let now = self.clock().now();
@@ -111,6 +128,7 @@ impl Session {
             self.tell_slow();
             hub.changed.wait(self.next_look(deadline));
         };
+        ticket.into_iter().for_each(|ticket| hub.forget(ticket));
         let reasons = self.failures_since(began);
         let ended = self.stop(force, true);
         Err(NotUp { why: why.0, reasons, interrupted: why.1, ended })

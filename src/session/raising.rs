@@ -137,7 +137,7 @@ impl Session {
         let coordinators = |file| given(file).map(|part| part.coordinator.clone()).collect();
         let inside: Vec<(EventName, Handles)> = reached.map(|(event, file)| (event, coordinators(file))).collect();
         let given_on: usize = inside.iter().map(|(_, coordinators)| coordinators.len()).sum();
-        (held.len() + given_on..self.parts().len()).for_each(|_| self.hub().taken_up(ticket, false));
+        (held.len() + given_on..self.parts().len()).for_each(|_| self.hub().taken_up(ticket, None));
         let (mut unwatched, mut missed) = (false, 0);
         {
             let _giving = self.junction().giving();
@@ -151,7 +151,7 @@ impl Session {
                 missed += 1;
             }
         }
-        (0..missed).for_each(|_| self.hub().taken_up(ticket, false));
+        (0..missed).for_each(|_| self.hub().taken_up(ticket, None));
         // Stopped meanwhile: then it acts by itself.
         let again = || make_safe(self.hub(), self.configurator(), event, Class::Outside);
         let acted = acted.or_else(|| gone.then(again).flatten());

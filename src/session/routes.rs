@@ -133,7 +133,7 @@ impl Junction {
         };
         for delivered in delivered {
             if delivered.is_err() && incoming.ticket != 0 {
-                hub.taken_up(incoming.ticket, false);
+                hub.taken_up(incoming.ticket, None);
             }
             hub.taken(delivered);
         }
@@ -255,7 +255,7 @@ impl Listener for ToConfigurator {
     }
 
     fn taken_up(&mut self, ticket: u64, delivered: Delivered) {
-        self.hub.taken_up(ticket, delivered == Delivered::Taken);
+        self.hub.taken_up(ticket, (delivered == Delivered::Taken).then_some(self.name));
         if let Some(junction) = self.junction.upgrade()
             && let Some(subsystems) = junction.subsystems()
         {

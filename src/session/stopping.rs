@@ -9,7 +9,8 @@ use super::{Command, Session, Unanswered};
 use crate::configurator::{FrameView, TakenDown};
 use crate::coordinator::Class;
 use crate::limits;
-use crate::model::{ConfigId, EventName, RequestId, Step};
+use crate::model::{ConfigId, EventName, Ident, RequestId, Step};
+use crate::stack::Requester;
 use crate::statechart::{EventId, NodeId};
 use crate::time::{Receiver, Time};
 use std::sync::atomic::Ordering;
@@ -403,13 +404,20 @@ impl Session {
 
     /// Whether a coordinator hears an event where it is.
     fn hears(&self, event: EventName) -> bool {
-        self.parts().iter().any(|part| {
+        self.who_hears(event, &[]).next().is_some()
+    }
+
+    /// The coordinators that hear an event where they are, but for these.
+    pub(super) fn who_hears(&self, event: EventName, but: &[Requester]) -> impl Iterator<Item = Ident> {
+        let others = self.parts().iter().filter(|part| !but.contains(&Requester::Coordinator(part.name.into())));
+        let hearing = others.filter(move |part| {
             let (chart, leaf) = (part.coordinator.chart(), part.coordinator.leaf());
             let number = chart.event(event);
             let mut inside = std::iter::successors(leaf, |node| chart.parent(*node));
             let hears = |node: NodeId| chart.outgoing(node).any(|edge| chart.may_trigger(edge, number));
             number != EventId::OTHER && inside.any(hears)
-        })
+        });
+        hearing.map(|part| part.name)
     }
 }
 
