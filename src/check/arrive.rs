@@ -192,6 +192,16 @@ impl Product<'_> {
 
     /// A batch comes to the desk.
     fn take_in(&mut self, mut state: ProductState, batch: &Batch, coming: &Coming) -> ProductState {
+        // Where others are not down nothing comes of it, and it waits for nothing that these have asked for.
+        if batch.is_down()
+            && let Some(first) = batch.requests.first()
+            && let Some(number) = self.member(first.requester)
+            && state.has_answered(first.requester)
+            && (self.others || !self.is_last_down(&state, number))
+        {
+            state.down |= bit(number);
+            return state;
+        }
         // To come to *down* twice with nothing asked for in between, by anybody, is to come once.
         let same =
             |other: &Batch| other.requests.first().map(|r| r.requester) == batch.requests.first().map(|r| r.requester);

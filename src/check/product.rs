@@ -22,7 +22,6 @@ use super::members::{Member, hears_loss, members};
 use super::neighbours::ParentInterface;
 use super::offers::AllOffers;
 use super::outcome::{Comes, ConcurrentWork, EMPTY, Held, Went, WorldId};
-use super::reactions::Macrostep;
 use super::seldom::{SharedSeldom, Unconfirmed};
 use super::shared_list::SharedList;
 use super::state::{Failed, Move, Next, Nexts, ProductState, Reacts, bit, index, one};
@@ -240,17 +239,7 @@ impl<'a> Product<'a> {
             children: 0,
         };
         let mut states = one(state);
-        let all = entered.len();
         for (by, reaction) in entered.iter().enumerate() {
-            // Who begins in *down* while others are not there waits for nothing that these ask for.
-            let begins_down = matches!(&reaction.handed[..], [only] if only.is_down());
-            let marked = |state: &ProductState| (state.down | bit(by)).count_ones() as usize != all;
-            if begins_down && states.iter().all(marked) {
-                let reaction = Macrostep { handed: Vec::new(), ..reaction.clone() };
-                let down = |state: ProductState| ProductState { down: state.down | bit(by), ..state };
-                states = states.into_iter().flat_map(|state| self.follow(down(state), by, &reaction)).collect();
-                continue;
-            }
             states = states.into_iter().flat_map(|state| self.follow(state, by, reaction)).collect();
         }
         // What several may come to is what one of them comes to a moment later; what is told at the start is told before anybody listens.
@@ -445,6 +434,14 @@ impl<'a> Product<'a> {
     /// Whether all of them have come to *down* and asked for nothing since.
     pub(super) fn all_down(&self, state: &ProductState) -> bool {
         (0..self.members.len()).all(|number| state.down & bit(number) != 0)
+    }
+
+    /// Whether all coordinators are down once that one is. Who has asked for something since is down no more once that begins.
+    pub(super) fn is_last_down(&self, state: &ProductState, number: usize) -> bool {
+        let is_down = |other: usize| {
+            other == number || state.down & bit(other) != 0 && state.has_answered(self.members[other].by)
+        };
+        (0..self.members.len()).all(is_down)
     }
 
     /// The coordinator that is in a state which means that the bring-up has failed: a running deployment is stopped there.

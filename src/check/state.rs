@@ -90,6 +90,14 @@ impl Deref for ProductState {
 }
 
 impl ProductState {
+    /// Whether nothing of that one waits or is being done, nor what is safe.
+    pub fn has_answered(&self, by: Requester) -> bool {
+        let of = |request: &&Request| request.requester == by;
+        self.desk.has_answered(by)
+            && self.safe.iter().find(of).is_none()
+            && self.undos().all(|undo| undo.requester != by)
+    }
+
     /// Batches of a requester that are not answered. That it has come to *down* once counts for nothing.
     pub fn outstanding(&self, by: Requester) -> usize {
         let first = |batch: &&Batch| batch.requests.first().is_some_and(|request| request.requester == by);

@@ -180,11 +180,8 @@ pub(super) enum UrgentCommand {
     Stopping,
     /// Somebody wants force: looked for by what takes its time.
     Hurry,
-    /// A coordinator has come to its *down* state, or `begins` there.
-    Down {
-        coordinator: Requester,
-        begins: bool,
-    },
+    /// A coordinator has come to its *down* state.
+    Down(Requester),
     /// The configurator's thread is to panic: a script tries that.
     Panic,
 }

@@ -7,10 +7,10 @@ use crate::stack::{Batch, Request, Requester, Why};
 use std::sync::atomic::Ordering;
 
 impl Engine {
-    /// A coordinator is down. It stands in the queue like a request, behind what it asked for; but where it `begins` so and others are not
-    /// down yet nothing comes of it, and what it asks for next waits for nothing that these have asked for.
-    pub(super) fn told_down(&mut self, coordinator: Requester, begins: bool) {
-        if begins && !self.is_last_down(coordinator) {
+    /// A coordinator is down. It stands in the queue like a request, behind what it asked for; but where that is answered and others are not
+    /// down nothing comes of it, and what it asks for next waits for nothing that these have asked for.
+    pub(super) fn told_down(&mut self, coordinator: Requester) {
+        if self.has_answered(coordinator) && !self.is_last_down(coordinator) {
             self.down.insert(coordinator);
             return;
         }
@@ -52,14 +52,18 @@ impl Engine {
         }
     }
 
+    /// Whether nothing of that one waits or is being done, nor what is safe.
+    fn has_answered(&self, coordinator: Requester) -> bool {
+        let own = |request: &Request| request.requester == coordinator;
+        self.desk.has_answered(coordinator)
+            && !self.safety.waiting.iter().any(own)
+            && !self.current.iter().any(|(request, _)| own(request))
+    }
+
     /// Whether all coordinators, or all of a subsystem, are down once that one is.
     fn is_last_down(&self, coordinator: Requester) -> bool {
         // Who has asked for something since is down no more once that begins.
-        let waits = |one: &Requester| {
-            let mut waiting = self.desk.waiting().filter(|batch| !batch.is_down()).flat_map(|batch| &batch.requests);
-            waiting.any(|request| request.requester == *one)
-        };
-        let is_down = |one: &Requester| *one == coordinator || self.down.contains(one) && !waits(one);
+        let is_down = |one: &Requester| *one == coordinator || self.down.contains(one) && self.has_answered(*one);
         let last = |all: &[Requester]| all.contains(&coordinator) && all.iter().all(is_down);
         self.given.coordinators.iter().all(is_down) || self.given.subsystems.iter().any(|(_, all)| last(all))
     }

@@ -292,7 +292,7 @@ impl Engine {
             UrgentCommand::Hurry => {}
             // It is no defect of the place it comes from.
             UrgentCommand::Panic => resume_unwind(Box::new("a panic was injected".to_owned())),
-            UrgentCommand::Down { coordinator, begins } => self.told_down(coordinator, begins),
+            UrgentCommand::Down(coordinator) => self.told_down(coordinator),
         }
     }
 

@@ -252,10 +252,9 @@ impl ConfiguratorHandle {
     }
 
     /// A coordinator has come to its *down* state: when that is taken up, behind what it asked for before, all coordinators
-    /// are down and nothing is there any more, what was in force is forgotten. `begins`: it was nowhere else before, and has asked for
-    /// nothing.
-    pub fn down(&self, coordinator: Requester, begins: bool) {
-        self.inner.post.command(UrgentCommand::Down { coordinator, begins });
+    /// are down and nothing is there any more, what was in force is forgotten.
+    pub fn down(&self, coordinator: Requester) {
+        self.inner.post.command(UrgentCommand::Down(coordinator));
     }
 
     /// Forgets the stack: the *down* state was reached with an empty system.

@@ -54,7 +54,6 @@ impl CoordinatorPart {
                 down: chart.find(&own.down).ok(),
                 is_down: false,
                 untold: false,
-                has_begun: false,
                 begins: false,
             };
             let thread = if several { format!("coordinator {name}") } else { "coordinator".to_owned() };

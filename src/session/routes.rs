@@ -157,8 +157,6 @@ pub(super) struct ToConfigurator {
     /// Whether it is in that, and whether that has not been told yet.
     pub is_down: bool,
     pub untold: bool,
-    /// It has asked for something, or an event was delivered: where it is down then, it has come there, and has not begun so.
-    pub has_begun: bool,
     /// The event that begins the deployment was delivered, and nothing has moved since.
     pub begins: bool,
 }
@@ -198,7 +196,6 @@ impl Listener for ToConfigurator {
                 }),
             }
         }
-        self.has_begun |= !requests.requests.is_empty();
         if let Some(junction) = self.junction.upgrade()
             && let Some(subsystems) = junction.subsystems().filter(|_| !requests.requests.is_empty())
         {
@@ -220,9 +217,6 @@ impl Listener for ToConfigurator {
     }
 
     fn delivers(&mut self, event: EventName) {
-        // What was not told yet is from before.
-        self.tell_down();
-        self.has_begun = true;
         let Some(junction) = self.junction.upgrade() else { return };
         self.begins = junction.begins(event);
         let led = junction.subsystems().and_then(|subsystems| subsystems.takes_up(self.name, event));
@@ -302,7 +296,7 @@ impl ToConfigurator {
         if std::mem::take(&mut self.untold)
             && let Some(configurator) = self.configurator()
         {
-            configurator.down(self.name, !self.has_begun);
+            configurator.down(self.name);
         }
     }
 

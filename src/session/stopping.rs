@@ -387,8 +387,14 @@ impl Session {
         let frame = frames.iter().find(holds).filter(|_| people)?;
         let force = "`davit shutdown --force` takes everything away by force";
         let shutdown = self.deployment().shutdown.event;
-        let safety = self.deployment().safety.iter().map(|(event, _)| *event).find(|event| self.hears(*event));
-        let leads_on = match (self.hears(shutdown), safety) {
+        // Of several coordinators the one that has it in force lets it go, or none does.
+        let lets_go = |part: Ident| match frame.by {
+            Requester::Coordinator(name) => name.as_str() == part.as_str(),
+            Requester::Operator | Requester::Safety => true,
+        };
+        let hears = |event: EventName| self.who_hears(event, &[]).any(lets_go);
+        let safety = self.deployment().safety.iter().map(|(event, _)| *event).find(|event| hears(*event));
+        let leads_on = match (hears(shutdown), safety) {
             (true, _) => {
                 format!("`davit shutdown` raises `{shutdown}` once more, which its coordinator hears there; {force}")
             }
@@ -400,11 +406,6 @@ impl Session {
 
     pub(super) fn is_safe(&self, id: ConfigId) -> bool {
         self.deployment().configurations.iter().any(|c| c.id == id && c.safe)
-    }
-
-    /// Whether a coordinator hears an event where it is.
-    fn hears(&self, event: EventName) -> bool {
-        self.who_hears(event, &[]).next().is_some()
     }
 
     /// The coordinators that hear an event where they are, but for these.

@@ -101,6 +101,12 @@ impl Desk {
         self.waiting.iter().map(|batch| batch.requests.len()).sum()
     }
 
+    /// Whether nothing of that one waits or is under way.
+    pub fn has_answered(&self, requester: Requester) -> bool {
+        let of = |batch: &Batch| batch.requests.iter().any(|request| request.requester == requester);
+        !self.waiting.iter().any(of) && !self.under_way.iter().any(|active| of(&active.batch))
+    }
+
     /// Whether a coordinator has asked for something since it told that it is down, if it has: what waits came after that.
     pub fn asks_on(&self) -> bool {
         let asks = |r: &Request| r.why == Why::Asked && matches!(r.requester, Requester::Coordinator(_));
