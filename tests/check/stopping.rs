@@ -620,3 +620,38 @@ fn an_event_that_came_just_before_is_heard_behind_the_one_that_ends_it() {
         assert_eq!(ran.code, exit, "{back} {}{}", ran.out, ran.err);
     }
 }
+
+/// From a mode that is entered while it is being stopped a failure alone leads on, in the end: that hides nothing of where nothing has failed.
+#[test]
+fn a_way_that_only_failures_open_hides_no_state_without_one() {
+    let states = |more: &str| {
+        format!(
+            "idle = state {{}}, fail = state {{}}, leave = state {{}}, again = state {{ entry = 'base.undo' }},
+             life = state {{ config = 'base', s = state {{}}, w = state {{}}, up = state {{}},
+               trans {{ src = 'initial', tgt = 's' }}, trans {{ src = 's', tgt = 'w', events = {{ 'e_shutdown' }} }},
+               trans {{ src = 's', tgt = 'up', events = {{ 'base.ok' }} }}, trans {{ src = 'w', tgt = 'up', events = {{ 'base.ok' }} }},
+               {more} }},
+             trans {{ src = 'initial', tgt = 'idle' }}, trans {{ src = 'idle', tgt = 'life', events = {{ 'e_start' }} }},
+             trans {{ src = 'life', tgt = 'fail', events = {{ 'base.failed', 'base.broken' }} }},
+             trans {{ src = 'life.up', tgt = 'leave', events = {{ 'e_shutdown' }} }},
+             trans {{ src = 'fail', tgt = 'again', events = {{ 'e_shutdown' }} }},
+             trans {{ src = 'leave', tgt = 'idle', events = {{ 'base.undone' }} }},
+             trans {{ src = 'leave', tgt = 'fail', events = {{ 'base.undo.failed', 'base.undo.broken' }} }},
+             trans {{ src = 'again', tgt = 'idle', events = {{ 'base.undone' }} }},
+             trans {{ src = 'again', tgt = 'fail', events = {{ 'base.undo.failed', 'base.undo.broken' }} }},"
+        )
+    };
+    let mode = "mode = state { config = 'soft' },
+        trans { src = 'up', tgt = 'mode', events = { 'e_mode' } },
+        trans { src = 'mode', tgt = 'up', events = { 'e_base', 'soft.failed', 'soft.broken' } },";
+    let leaves = "trans { src = 'life.mode', tgt = 'leave', events = { 'e_shutdown' } },";
+    for states in [states(""), states(mode) + leaves] {
+        let soft = format!("{BASE}, soft = Configuration {{ property_set('a.gain', 2.0) }}");
+        let small = Small::new(&soft, &states, "");
+        let said = small.check();
+        let told = only(&said, "coord::no_way_down");
+        assert_eq!(told["severity"], "warning", "{told:#}");
+        let message = told["message"].as_str().unwrap();
+        assert!(message.starts_with("from `root.life.up` only a second `e_shutdown` leads down"), "{message}");
+    }
+}

@@ -149,6 +149,56 @@ fn both_come_up_in_the_time_of_one() {
     });
 }
 
+/// Nor does it where it has come there: what others ask for is done meanwhile, and what it asks for next.
+#[test]
+fn who_is_down_keeps_nobody_waiting() {
+    let own = configurations(|name| if name == "arm" { "armDrive" } else { "gripperDrive" });
+    let slow = format!("{HOLDS}faults: [{{ step: configure gripperDrive, how: slow, times: 2, takes_s: 0.8 }}]\n");
+    // It comes down when what it has undone is answered.
+    let waits = holder("arm").replacen(
+        "trans { src = \"on\", tgt = \"idle\", events",
+        "leaving = state {}, trans { src = \"leaving\", tgt = \"idle\",
+           events = { \"arm_base.undone\", \"arm_base.undo.failed\", \"arm_base.undo.broken\" } },
+          trans { src = \"on\", tgt = \"leaving\", events",
+        1,
+    );
+    assert!(waits.contains("leaving"));
+    let others = [("conf.lua", &*own), ("arm.lua", &*waits), ("gripper.lua", &holder("gripper"))];
+    Run::with(&accepted(&slow, &others), |run| {
+        run.session.bring_up().unwrap();
+        run.event("e_gripper_off");
+        run.event("e_gripper_on");
+        run.event("e_arm_off");
+        run.event("e_arm_on");
+        assert_eq!(run.frames(), ["arm_base by arm".to_owned()].into(), "the gripper is still being made");
+        run.clock.sleep(Duration::from_secs(1));
+        assert_eq!(run.frames(), run.implied());
+        assert!(run.session.take_down(false).is_orderly());
+        assert!(run.frames().is_empty());
+    });
+}
+
+/// The event that begins it comes while one still does what it asks for at its beginning, and hears nothing of it then.
+#[test]
+fn who_has_something_to_do_at_the_beginning_comes_up_too() {
+    let own = configurations(|name| if name == "arm" { "armDrive" } else { "gripperDrive" });
+    let boots = holder("arm").replacen(
+        "trans { src = \"initial\", tgt = \"idle\" },",
+        "boot = state { entry = \"arm_base\" }, booted = state { entry = \"arm_base.undo\" },
+          trans { src = \"initial\", tgt = \"boot\" },
+          trans { src = \"boot\", tgt = \"booted\", events = { \"arm_base.ok\", \"arm_base.failed\", \"arm_base.broken\" } },
+          trans { src = \"booted\", tgt = \"idle\", events = { \"arm_base.undone\", \"arm_base.undo.failed\", \"arm_base.undo.broken\" } },",
+        1,
+    );
+    let others = [("conf.lua", &*own), ("arm.lua", &*boots), ("gripper.lua", &holder("gripper"))];
+    Run::with(&accepted(HOLDS, &others), |run| {
+        run.session.bring_up().unwrap();
+        assert_eq!(run.frames(), run.implied());
+        assert!(run.session.in_state("arm:on") && run.session.in_state("gripper:on"));
+        assert!(run.session.take_down(false).is_orderly());
+    });
+}
+
 #[test]
 fn each_comes_up_undoes_its_own_and_goes_down() {
     let checked = two();
