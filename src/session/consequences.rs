@@ -28,7 +28,8 @@ impl Session {
             configuration.group.is_some()
                 && deployment.configuration(frame.configuration).map(|c| c.group) == Some(configuration.group)
         };
-        let now = self.frames().unwrap_or_default();
+        // Where that is not known nothing is said of it.
+        let Ok(now) = self.frames() else { return confirm.into_iter().collect() };
         let gone = |frame: &&FrameView| {
             !now.iter().any(|other| (other.configuration, other.at) == (frame.configuration, frame.at))
         };
