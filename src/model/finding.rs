@@ -271,6 +271,6 @@ mod tests {
         assert_eq!(nearest("arm", ["arm"]), None, "itself is no help");
         let keys = ["src", "tgt", "events", "pn"];
         let meant = ["scr", "target", "source", "tagret", "pen", "guard"].map(|name| nearest(name, keys));
-        assert_eq!(meant, [Some("src"), Some("tgt"), Some("src"), Some("tgt"), Some("pn"), None]);
+        assert_eq!(meant, [Some("src"), Some("tgt"), Some("src"), Some("tgt"), None, None]);
     }
 }
