@@ -117,13 +117,6 @@ struct ScriptHost {
 }
 
 impl ScriptHost {
-    /// One that it brought up has ended: what the command's exit status tells is one that did not end in order, if there was one.
-    fn has_ended(&mut self, ended: Ended) {
-        if !ended.is_orderly() || self.ended.as_ref().is_none_or(Ended::is_orderly) {
-            self.ended = Some(ended);
-        }
-    }
-
     /// What was up is down, and nobody looks at it any more.
     fn down(&mut self) {
         self.recordings.stop();
@@ -190,8 +183,7 @@ pub fn run(path: &Path, options: ScriptOptions) -> ScriptEnd {
     let missed = figures::failure(&host.figures).map(|message| ScriptFailure::Missed { message });
     let scene = if failure.is_some() { scene } else { host.scene.take() };
     if let Some(session) = host.session.take() {
-        let ended = session.take_down(false);
-        host.has_ended(ended);
+        host.ended = Some(session.take_down(false));
         host.down();
     }
     let not_injected = host.not_injected.drain(..).next();

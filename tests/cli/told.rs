@@ -119,17 +119,6 @@ fn a_deployment_is_no_script_and_a_parameter_that_nothing_reads_is_a_mistake_of_
     }
 }
 
-/// What a later one came to takes nothing back of it.
-#[test]
-fn a_bring_up_that_was_ended_without_its_coordinator_is_told_by_the_exit_status() {
-    let story = "fault('configure source', 'hang', 1)
-        assert(not pcall(deploy, 'deployment.yaml'))
-        deploy('deployment.yaml') shutdown()";
-    let ran = scripted(story);
-    assert_eq!(ran.code, 4, "{}{}", ran.out, ran.err);
-    assert_eq!(scripted("deploy('deployment.yaml') shutdown()").code, 0);
-}
-
 #[test]
 fn what_is_planned_alone_says_what_has_to_come_before() {
     let demo = Demo::new();

@@ -87,7 +87,7 @@ pub(super) fn deploy(host: &SharedHost, file: &str, options: Option<Table>) -> m
                 text.push_str(reason);
             }
             let mut host = host.borrow_mut();
-            host.has_ended(ended);
+            host.ended = Some(ended);
             host.door = None;
             host.faults.down();
             Err(error(text))
@@ -103,6 +103,6 @@ pub(super) fn shutdown(host: &SharedHost, force: bool) -> mlua::Result<()> {
     host.down();
     let clean = ended.is_clean();
     let left = ended.left.join(", ");
-    host.has_ended(ended);
+    host.ended = Some(ended);
     if clean { Ok(()) } else { Err(error(format!("the shutdown left something behind: {left}"))) }
 }
