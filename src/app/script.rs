@@ -312,7 +312,13 @@ fn install(lua: &Lua, host: &SharedHost) -> mlua::Result<()> {
     meta.set(
         "__index",
         lua.create_function(|_, (_, name): (Table, String)| -> mlua::Result<LuaValue> {
-            Err(error(format!("`{name}` is not defined: {}", did_you_mean(&name, "functions", arguments::functions()))))
+            // What Lua has for it elsewhere is near nothing here.
+            let meant = match name.as_str() {
+                "print" => "did you mean `say`?".to_owned(),
+                "sleep" => "did you mean `wait`?".to_owned(),
+                _ => did_you_mean(&name, "functions", arguments::functions()),
+            };
+            Err(error(format!("`{name}` is not defined: {meant}")))
         })?,
     )?;
     globals.set_metatable(Some(meta))

@@ -2,8 +2,8 @@
 
 use super::belief::Beliefs;
 use super::reactions::{Macrostep, Reactions};
-use super::seldom_told::told_seldom;
 use super::state::ProductState;
+use super::uncertain::uncertain_events;
 use crate::model::{Ask, ConfigId, Configuration, Deployment, EventName, Ident, Subsystem, SubsystemStanding};
 use crate::stack::{Requester, claims};
 use crate::statechart::{Chart, compile};
@@ -22,6 +22,8 @@ pub struct Child {
     pub up: EventName,
     /// Until the parent raises this one.
     pub until: EventName,
+    /// What it tells when it wants to leave.
+    pub leaves: Option<EventName>,
     pub down: EventName,
     /// Configurations that touch what it exports.
     pub touching: FxHashSet<ConfigId>,
@@ -30,7 +32,7 @@ pub struct Child {
     /// It may do so though nobody has begun it.
     pub unbidden: bool,
     /// What it tells only where something has failed, or a monitor reports it.
-    pub seldom: BTreeSet<EventName>,
+    pub uncertain: BTreeSet<EventName>,
     /// What may be known of it; none: it may tell anything in any order.
     pub beliefs: Option<Beliefs>,
 }
@@ -45,6 +47,7 @@ impl Child {
             let (own, path) = (&*subsystem.own, subsystem.name);
             let from =
                 own.interface.from.map_or_else(|| SubsystemStanding::Up.event(path), |(event, _)| event.within(path));
+            let leaves = own.interface.leaving.map(|leaving| leaving.says.within(path));
             let until = own.interface.leaving.map_or(own.shutdown.event, |leaving| leaving.until).within(path);
             let touches = |c: &&Configuration| {
                 c.id != ConfigId::from(path) && claims::components(c).iter().any(|c| c.local(path).is_some())
@@ -53,8 +56,8 @@ impl Child {
             let (begins, down) = (own.deploy.event.within(path), SubsystemStanding::Down.event(path));
             let (holds, unbidden) = (subsystem.holds.clone(), !subsystem.holds.is_empty() && is_unbidden(subsystem));
             let (up, beliefs) = (SubsystemStanding::Up.event(path), None);
-            let seldom = told_seldom(own).into_iter().map(|event| event.within(path)).collect();
-            Self { path, begins, from, up, until, down, touching, holds, unbidden, seldom, beliefs }
+            let uncertain = uncertain_events(own).into_iter().map(|event| event.within(path)).collect();
+            Self { path, begins, from, up, until, leaves, down, touching, holds, unbidden, uncertain, beliefs }
         };
         deployment.subsystems.iter().take(MOST_CHILDREN).map(of).collect()
     }
@@ -108,6 +111,8 @@ pub struct WatchedSubsystem {
     pub path: Ident,
     /// The event that begins it.
     pub begins: EventName,
+    /// The one that ends it.
+    pub ends: EventName,
     pub members: Vec<usize>,
 }
 
@@ -131,8 +136,8 @@ impl WatchedSubsystem {
         }
         let of = |path: Ident| (0..names.len()).filter(|number| names[*number].1 == Some(path)).collect::<Vec<_>>();
         let all = deployment.all_subsystems().into_iter().map(|(path, subsystem)| {
-            let begins = subsystem.own.deploy.event.within(path);
-            Self { path, begins, members: of(path) }
+            let (begins, ends) = (subsystem.own.deploy.event.within(path), subsystem.own.shutdown.event.within(path));
+            Self { path, begins, ends, members: of(path) }
         });
         all.filter(|watched| !watched.members.is_empty()).take(MOST).collect()
     }

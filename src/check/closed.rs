@@ -2,13 +2,14 @@
 //! raises from outside is refused then ([`Deployment::stays_open`](crate::model::Deployment::stays_open)). What components
 //! and monitors report comes all the same, where they have reason to: [`bars`](super::bars).
 
+use super::children::Child;
 use super::edges::Barred;
 use super::from_outside::{FromOutside, Raises};
 use super::product::Product;
 use super::reactions::triggers;
-use super::seldom_told::fails;
 use super::state::{Move, ProductState};
-use crate::model::{Ask, EventName, Monitor, Verdict};
+use super::uncertain::fails;
+use crate::model::{Ask, EventName, Monitor, SubsystemStanding, Verdict};
 use crate::statechart::EventId;
 
 impl Product<'_> {
@@ -92,10 +93,23 @@ impl Product<'_> {
         reacts || deployment.monitors.iter().flat_map(Monitor::events).any(|event| event == name)
     }
 
+    /// Whether it comes from outside, and need not come: it tells that something has failed, or on the way up that a subsystem leaves.
+    pub(super) fn need_not_come(&self, by: Move, stopping: bool) -> bool {
+        let Move::Event(at) = by else { return false };
+        let name = self.outside[usize::from(at)];
+        let tells = |child: &Child| {
+            let fell = [SubsystemStanding::Failed, SubsystemStanding::Stranded];
+            child.uncertain.contains(&name)
+                || fell.iter().any(|standing| standing.event(child.path) == name)
+                || !stopping && (child.down == name || child.leaves == Some(name))
+        };
+        fails(name) || self.is_reported(name) || self.children.iter().any(tells)
+    }
+
     fn may_raise(&self, name: EventName) -> Raises {
         let deployment = self.deployment;
         let simulated = deployment.kind.imitates;
-        if self.children.iter().any(|child| child.seldom.contains(&name)) {
+        if self.children.iter().any(|child| child.uncertain.contains(&name)) {
             return Raises::Sometimes;
         }
         // What a subsystem tells nobody can refuse. That something fails nobody can promise, though they may tell it by hand.

@@ -66,6 +66,7 @@ where
         subsystem.holds = inside.flat_map(|(_, names)| names.iter().cloned()).collect();
     }
     let (mut report, shows) = one(Arc::new(view), &types, &around);
+    report.findings.iter_mut().for_each(|finding| as_exported(finding, &whole.subsystems));
     for finding in simulated::faults(whole.own_part(), &whole, &Universe::new(&whole, catalogue)) {
         report.findings.push(finding);
         report.traces.push(Vec::new());
@@ -272,6 +273,17 @@ fn put_together(whole: Arc<Deployment>, reports: Vec<(Vec<Ident>, Report)>) -> R
     let checked = (verdict != CheckVerdict::Refused).then(|| Accepted::new(whole.clone()));
     let replayed = replayed.then(|| Accepted::new(whole));
     Report { checked, replayed, findings, traces, explored, left, verdict }
+}
+
+/// What a finding says to write names what subsystems export as their parent may write it.
+fn as_exported(finding: &mut Finding, subsystems: &[Subsystem]) {
+    let Some(help) = &mut finding.help else { return };
+    for subsystem in subsystems {
+        for (alias, export) in &subsystem.own.interface.exports {
+            let inside = format!("\"{}.{}\"", export.of.component.within(subsystem.name), export.of.member);
+            *help = help.replace(&inside, &format!("\"{}.{alias}\"", subsystem.name));
+        }
+    }
 }
 
 /// The way to a finding of a subsystem's file: it is gone where that is deployed alone.

@@ -117,11 +117,11 @@ fn asked_for(ids: &[&str], name: &str) -> Vec<String> {
 }
 
 fn raised(deployment: &Deployment, chart: &Chart, known: &KnownEvents<'_>, findings: &mut Findings) {
-    let ids: Vec<&str> = deployment.configurations.iter().map(|c| c.id.as_str()).collect();
+    let ids: Vec<&str> = deployment.named_configurations().map(|c| c.id.as_str()).collect();
     let mut unknown = BTreeSet::new();
     let emits: BTreeSet<EventName> = deployment.emits.iter().map(|(e, _)| *e).collect();
     for site in chart.raises() {
-        let is_known = match Raise::of(site.name, |id| deployment.configuration(id).is_some()) {
+        let is_known = match Raise::of(site.name, |id| ids.contains(&id.as_str())) {
             Raise::Request(_) => true,
             Raise::UnknownUndo => false,
             Raise::Event => emits.contains(&site.name),
@@ -181,7 +181,7 @@ fn raised(deployment: &Deployment, chart: &Chart, known: &KnownEvents<'_>, findi
 
 fn heard(deployment: &Deployment, chart: &Chart, known: &KnownEvents<'_>, findings: &mut Findings) {
     let answers = answers(deployment, chart);
-    let ids: Vec<&str> = deployment.configurations.iter().map(|c| c.id.as_str()).collect();
+    let ids: Vec<&str> = deployment.named_configurations().map(|c| c.id.as_str()).collect();
     let mut said: BTreeSet<EventName> = BTreeSet::new();
     for edge in edges(chart) {
         for trigger in chart.triggers(edge).unwrap_or(&[]) {

@@ -110,10 +110,10 @@ fn unseen(deployment: &Deployment, holds: &Condition) -> Option<Finding> {
 }
 
 fn configuration(deployment: &Deployment, id: ConfigId, at: Origin) -> Option<Finding> {
-    if deployment.configuration(id).is_some() {
+    if deployment.named_configurations().any(|c| c.id == id) {
         return None;
     }
-    let known = deployment.configurations.iter().map(|c| c.id.as_str());
+    let known = deployment.named_configurations().map(|c| c.id.as_str());
     Some(
         Finding::error(DEPLOY_UNKNOWN_CONFIGURATION, format!("there is no configuration `{id}`"))
             .at(at)

@@ -137,7 +137,7 @@ impl Deriving<'_, '_, '_> {
                     // Nobody begins it.
                     continue;
                 }
-                let next = self.after(next, name);
+                let next = self.after(next, name, !by.dropped());
                 let to = self.at(next);
                 if !self.parent.raises.contains(&name) {
                     self.tells(number, next.failed, &tells, to);
@@ -151,7 +151,7 @@ impl Deriving<'_, '_, '_> {
             for name in self.parent.raises.difference(&taken).copied().collect::<Vec<_>>() {
                 // Where one would take it, and so many requests wait that it was not followed, it waits as well.
                 if !graph.product.defers(at, name) {
-                    let next = self.after(place, name);
+                    let next = self.after(place, name, false);
                     let to = self.at(next);
                     self.takes(number, (name, false), next.failed, &SharedList::new(), to);
                 }
@@ -169,13 +169,16 @@ impl Deriving<'_, '_, '_> {
         self.hears.contains(&event)
     }
 
-    /// Where it is when it has taken an event up there.
-    fn after(&mut self, place: ShownPlace, event: EventName) -> ShownPlace {
-        let begins = event == self.begins && place.told == Some(SubsystemStanding::Down);
+    /// Where it is when it has taken an event up there, `heeded` by a transition or not.
+    fn after(&mut self, place: ShownPlace, event: EventName, heeded: bool) -> ShownPlace {
+        let was_down = place.told == Some(SubsystemStanding::Down);
+        let begins = event == self.begins && was_down;
         let minds = self.waits_for(SubsystemStanding::Stranded);
         let ending = minds && (event == self.ends || place.ending && event != self.begins);
         match begins {
             true => ShownPlace { told: None, ending, failed: Failed::Nothing, ..place },
+            // Who ends what nobody has begun is told when that is down.
+            false if event == self.ends && heeded && was_down => ShownPlace { told: None, ending, ..place },
             false => ShownPlace { ending, ..place },
         }
     }

@@ -3,14 +3,14 @@
 use super::let_go;
 use super::universe::Universe;
 use crate::model::codes::{COMPOSE_EXPORT_DRIVEN, COMPOSE_SAFETY, COMPOSE_UNKNOWN, COMPOSE_WORD};
-use crate::model::finding::did_you_mean;
+use crate::model::finding::{did_you_mean, nearest};
 use crate::model::subsystem::IGNORED;
 use crate::model::{
     Catalogue, ChangeKind, Deployment, Direction, EventName, Finding, Findings, Ident, Origin, Subsystem,
     SubsystemStanding,
 };
 use crate::statechart::{Chart, EventId};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// What is wrong with what it shows.
 pub fn check(deployment: &Deployment, universe: &Universe, charts: &[&Chart]) -> Findings {
@@ -119,15 +119,40 @@ pub fn between(own: &Deployment, charts: &[&Chart], catalogue: &Catalogue) -> Fi
         for (event, origin) in declared {
             let mut missing = Vec::new();
             unsafe_in(subsystem, subsystem.name, event, catalogue, &mut missing);
+            let theirs = subsystem.own.safety.iter().map(|(event, _)| event.as_str());
+            let meant = nearest(event.as_str(), theirs).map(|near| format!("did you mean `{near}`? Else "));
             for (path, at) in missing {
                 let message = format!("`{event}` does not reach `{path}`, which has actuators");
                 findings.push(Finding::error(COMPOSE_SAFETY, message).at(at).also(origin, "declared here").help(
-                    format!("list it under `safety` in the file of `{path}`, where it leads to a safe configuration"),
+                    format!(
+                        "{}list it under `safety` in the file of `{path}`, where it leads to a safe configuration",
+                        meant.as_deref().unwrap_or_default()
+                    ),
                 ));
             }
         }
     }
+    findings.extend(unlisted(own));
     findings
+}
+
+/// Safety events of subsystems that no event of their deployment's own stands for: nobody can stop all of them at once.
+fn unlisted(own: &Deployment) -> Option<Finding> {
+    let mut theirs: BTreeMap<EventName, Vec<Ident>> = BTreeMap::new();
+    for subsystem in &own.subsystems {
+        subsystem.own.safety.iter().for_each(|(event, _)| theirs.entry(*event).or_default().push(subsystem.name));
+    }
+    let (event, of) = theirs.into_iter().find(|_| own.safety.is_empty())?;
+    let of: Vec<String> = of.iter().map(|name| format!("`{name}/{event}`")).collect();
+    let message = format!("there is no `safety` here: {} have to be raised one by one", of.join(", "));
+    let first = own.subsystems.first().map(|subsystem| subsystem.origin)?;
+    let message =
+        if of.len() == 1 { message.replace("have to be raised one by one", "has to be raised") } else { message };
+    Some(
+        Finding::info(COMPOSE_SAFETY, message)
+            .at(first)
+            .help(format!("list `safety: [{event}]` here as well: it is heard in all subsystems then")),
+    )
 }
 
 /// The subsystems with actuators that do not declare a safety event, to any depth.

@@ -4,7 +4,7 @@ use super::coordinator::{answers, ask_of};
 use super::product::Product;
 use super::reactions::triggers;
 use crate::model::codes::COORD_STUCK;
-use crate::model::{Ask, EventName, Finding};
+use crate::model::{Ask, EventName, Finding, Verdict};
 use crate::statechart::{NodeId, RaiseMoment};
 use std::collections::BTreeSet;
 
@@ -22,7 +22,13 @@ impl Product<'_> {
         // What it asks for itself, and hears another answer to.
         let entered = |site: &&crate::statechart::RaiseSite| matches!(site.when, RaiseMoment::Entry(node) if chart.is_inside(leaf, node));
         let asks = chart.raises().iter().filter(entered).filter_map(|site| ask_of(deployment, site.name));
-        let told = |ask: Ask| [ask.done(), ask.failed(), ask.broken()].map(|verdict| verdict.event(ask));
+        // What still waits when a safe configuration comes is cancelled.
+        let cancels = deployment.configurations.iter().any(|configuration| configuration.safe);
+        let told = |ask: Ask| {
+            let cancelled = (cancels && !ask.is_undo()).then_some(Verdict::Cancelled);
+            let ends = [ask.done(), ask.failed(), ask.broken()].into_iter().chain(cancelled);
+            ends.map(|verdict| verdict.event(ask)).collect::<Vec<_>>()
+        };
         let own: Vec<Ask> = asks.filter(|ask| told(*ask).iter().any(|answer| names.contains(answer))).collect();
         let unhandled: BTreeSet<EventName> =
             own.iter().flat_map(|ask| told(*ask)).filter(|answer| !names.contains(answer)).collect();

@@ -93,6 +93,8 @@ fn search(
     begins: bool,
 ) -> Way {
     let mut states: Vec<(ProductState, Option<usize>, Vec<Next>)> = Vec::new();
+    // To which of them something leads that need not come: where it does not arrive, these do not show why.
+    let mut ill: FxHashSet<usize> = FxHashSet::default();
     let mut index: FxHashSet<ProductState> = FxHashSet::default();
     let mut queue: VecDeque<usize> = VecDeque::new();
     let mut refused: Option<(usize, Vec<Next>, (Request, Findings))> = None;
@@ -112,17 +114,22 @@ fn search(
             unfollowed = true;
             break;
         }
-        last = at;
+        if !ill.contains(&at) {
+            last = at;
+        }
         let first = begins && at == 0;
         for next in product.outside_moves(&state, tried, first) {
             if !first && !product.concerns(next.by, part) {
                 continue;
             }
+            let is_ill = ill.contains(&at) || product.need_not_come(next.by, tried.stopping);
             let mut moves = vec![next.clone()];
             let rest = product.rest(next.state, goal, &mut moves, None);
             if let Some((by, last)) = tried.fails(product, &moves) {
                 moves.truncate(last + 1);
-                let _ = failed.get_or_insert((at, moves, by));
+                if !is_ill {
+                    let _ = failed.get_or_insert((at, moves, by));
+                }
                 continue;
             }
             match rest {
@@ -130,6 +137,9 @@ fn search(
                     if index.insert(rest.clone()) {
                         // Where answers go round for ever is what keeps it from coming anywhere.
                         round = round.or((!rest.is_at_rest()).then_some(states.len()));
+                        if is_ill {
+                            ill.insert(states.len());
+                        }
                         queue.push_back(states.len());
                         states.push((rest, Some(at), moves));
                     }

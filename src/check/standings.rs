@@ -20,12 +20,16 @@ impl Product<'_> {
         }
     }
 
-    /// One of the coordinators takes an event up: it may be the one that begins its subsystem.
-    pub(super) fn begins_subsystem(&self, state: &mut ProductState, number: usize, event: EventId) {
-        for (at, watched) in self.watched.iter().enumerate() {
-            let begins =
-                watched.members.contains(&number) && self.members[number].name_of(event) == Some(watched.begins);
-            if begins && told(state, at) == Some(SubsystemStanding::Down) {
+    /// One of the coordinators takes an event up: it may be the one that begins its subsystem, or one that ends it and leads somewhere.
+    pub(super) fn begins_subsystem(&mut self, state: &mut ProductState, number: usize, event: EventId) {
+        if self.watched.is_empty() {
+            return;
+        }
+        let Some(name) = self.members[number].name_of(event) else { return };
+        let leads = self.members[number].takes(state.leaves[number], name);
+        for (at, watched) in self.watched.iter().enumerate().filter(|(_, watched)| watched.members.contains(&number)) {
+            let anew = name == watched.begins || leads && name == watched.ends;
+            if anew && told(state, at) == Some(SubsystemStanding::Down) {
                 tell(state, at, None);
             }
         }

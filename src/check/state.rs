@@ -92,10 +92,8 @@ impl Deref for ProductState {
 impl ProductState {
     /// Whether nothing of that one waits or is being done, nor what is safe.
     pub fn has_answered(&self, by: Requester) -> bool {
-        let of = |request: &&Request| request.requester == by;
-        self.desk.has_answered(by)
-            && self.safe.iter().find(of).is_none()
-            && self.undos().all(|undo| undo.requester != by)
+        let own = |request: &Request| request.requester == by;
+        self.desk.has_answered(by) && !self.safe.iter().any(own) && !self.undos().any(own)
     }
 
     /// Batches of a requester that are not answered. That it has come to *down* once counts for nothing.

@@ -4,15 +4,17 @@ use super::closed::still_comes;
 use super::drive;
 use super::effort::Effort;
 use super::judge::Traced;
+use super::members::Member;
 use super::product::Product;
 use super::state::{Next, ProductState};
 use super::timers::Timer;
 use super::trace::TraceStep;
-use super::tried::Way;
+use super::tried::{Goal, Way};
 use crate::limits;
 use crate::model::codes::{DEPLOY_LEFTOVERS, DEPLOY_NEVER_DOWN, DEPLOY_NEVER_UP, STACK_SQUASHED};
-use crate::model::{Catalogue, Code, Coordinator, Deployment, Finding, Origin, Severity};
+use crate::model::{Catalogue, Code, Deployment, EventName, Finding, Origin, Severity};
 use crate::statechart::{Chart, NodeId};
+use std::collections::BTreeSet;
 
 /// What is wrong with the bring-up and the shutdown, with the ways to it from the start.
 pub fn ways(product: &mut Product<'_>) -> Traced {
@@ -36,14 +38,15 @@ pub fn ways(product: &mut Product<'_>) -> Traced {
     };
     let mut up = reasons(&rise);
     if !rise.reached && !rise.unfollowed {
-        up.push(stops(product, &rise, DEPLOY_NEVER_UP, "deploy.up", |c| &c.up, "the bring-up"));
+        up.push(stops(product, &rise, DEPLOY_NEVER_UP, "deploy.up", |member| member.goal_up(), "the bring-up"));
     }
     up.extend(late(product, &rise, DEPLOY_NEVER_UP, "deploy.within_s", "the bring-up"));
     let mut down = fall.as_ref().map(reasons).unwrap_or_default();
     if let Some(fall) = &fall {
         down.extend(late(product, fall, DEPLOY_NEVER_DOWN, "shutdown.within_s", "the shutdown"));
         if !fall.reached {
-            let stops = || stops(product, fall, DEPLOY_NEVER_DOWN, "shutdown.down", |c| &c.down, "the shutdown");
+            let stops =
+                || stops(product, fall, DEPLOY_NEVER_DOWN, "shutdown.down", |member| member.down, "the shutdown");
             down.extend((!fall.unfollowed).then(stops));
         } else if let Some(finding) = leftovers(product, fall.end()) {
             down.push(finding);
@@ -108,15 +111,12 @@ fn trace(product: &mut Product<'_>, ways: &[&Way]) -> Vec<TraceStep> {
     steps
 }
 
-fn stops(
-    product: &Product<'_>,
-    way: &Way,
-    code: Code,
-    key: &str,
-    goal: fn(&Coordinator) -> &String,
-    what: &str,
-) -> Finding {
+fn stops(product: &Product<'_>, way: &Way, code: Code, key: &str, goal: Goal, what: &str) -> Finding {
     let deployment = product.deployment;
+    // Those that have not arrived.
+    let inside = |member: &Member<'_>, leaf| goal(member).is_some_and(|goal| member.chart.is_inside(leaf, goal));
+    let all = product.members.iter().zip(&way.end().leaves);
+    let short: Vec<(&Member<'_>, &NodeId)> = all.filter(|(member, leaf)| !inside(member, **leaf)).collect();
     let at = product.place(way.end());
     let rests = way.end().is_at_rest();
     let finding = match (&way.refused, way.failed) {
@@ -151,7 +151,14 @@ fn stops(
                     .at(deployment.key_origin(key))
                     .path(key);
             }
-            let goals: Vec<String> = deployment.coordinators.iter().map(|c| format!("`{}`", goal(c))).collect();
+            // As its file has it.
+            let written = |member: &Member<'_>| {
+                let coordinator = deployment.coordinators.iter().find(|coordinator| coordinator.name == member.name);
+                let up = code == DEPLOY_NEVER_UP;
+                coordinator.map_or("", |of| if up { &of.up } else { &of.down })
+            };
+            let goals: BTreeSet<String> = short.iter().map(|(member, _)| format!("`{}`", written(member))).collect();
+            let goals: Vec<String> = goals.into_iter().collect();
             let stops = if rests { "stops at" } else { "goes round for ever at" };
             let message = format!("{what} {stops} `{at}` and never reaches {}", goals.join(", "));
             let mut finding = Finding::error(code, message);
@@ -159,7 +166,7 @@ fn stops(
                 let why = format!("is never over: {} always comes first", product.waits_for(first));
                 finding = finding.also(waits_at(product, waits), why);
             }
-            for (member, leaf) in product.members.iter().zip(&way.end().leaves) {
+            for (member, leaf) in short {
                 finding = finding.also(member.chart.origin(*leaf), "stops here, even if every request succeeds");
             }
             finding
@@ -180,12 +187,32 @@ fn stops(
             "what would lead on takes {waits}, and {first} always comes before: give it less time, or the other more"
         )
     });
-    let help = help.or(failed).or(overtaken).unwrap_or_else(|| match closed.first() {
+    let untold = || untold(product, code);
+    let help = help.or(failed).or(overtaken).or_else(untold).unwrap_or_else(|| match closed.first() {
         Some(event) => still_comes(event.as_str()),
+        None if way.refused.is_some() => {
+            "see what is said of it, or let the coordinator ask for it elsewhere".to_owned()
+        }
         None if !rests => "wait for an event or for a time (`e_after(1.0)`) somewhere on the way round".to_owned(),
         None => format!("look at the trace: which event does {several}?"),
     });
     finding.help(help).at(deployment.key_origin(key)).path(key)
+}
+
+/// The subsystems that nobody ever tells what begins them, or ends them: what to do about it.
+fn untold(product: &Product<'_>, code: Code) -> Option<String> {
+    let raised: BTreeSet<EventName> =
+        product.members.iter().flat_map(|member| member.chart.raises()).map(|site| site.name).collect();
+    let subsystems = product.deployment.all_subsystems().into_iter();
+    let all = subsystems.map(|(path, subsystem)| {
+        let own = &subsystem.own;
+        let event = if code == DEPLOY_NEVER_UP { own.deploy.event } else { own.shutdown.event };
+        (path, event.within(path))
+    });
+    let does = if code == DEPLOY_NEVER_UP { "begins" } else { "ends" };
+    let untold = all.filter(|(_, event)| !raised.contains(event)).take(4);
+    let untold: Vec<String> = untold.map(|(path, event)| format!("`{event}`, which {does} `{path}`")).collect();
+    (!untold.is_empty()).then(|| format!("no coordinator raises {}: raise it on the way", untold.join(", nor ")))
 }
 
 /// A way that lasts longer than there is time for it, where none is shorter.

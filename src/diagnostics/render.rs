@@ -8,6 +8,7 @@ use miette::{
     Diagnostic, GraphicalReportHandler, GraphicalTheme, LabeledSpan, MietteError, MietteSpanContents, SourceCode,
     SourceSpan, SpanContents,
 };
+use std::borrow::Cow;
 use std::fmt::{self, Write as _};
 use std::ops::Range;
 use std::sync::Arc;
@@ -73,7 +74,7 @@ pub fn to_json(findings: &[Finding], sources: &SourceMap) -> serde_json::Value {
             "file": file,
             "line": line,
             "column": column,
-            "help": finding.help.as_ref().map(|help| sources.told(finding.origin, help)),
+            "help": sources.told_help(finding),
         });
         if !finding.path.is_empty() {
             object["path"] = finding.path.clone().into();
@@ -125,7 +126,7 @@ impl FindingReport {
             message: sources.told(finding.origin, &finding.message).into_owned(),
             code: format!("davit::{}", finding.code),
             severity,
-            help: finding.help.as_ref().map(|help| sources.told(finding.origin, help).into_owned()),
+            help: sources.told_help(finding).map(Cow::into_owned),
             source: None,
             labels: Vec::new(),
             related: Vec::new(),

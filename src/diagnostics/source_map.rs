@@ -3,7 +3,7 @@
 use super::large::Large;
 use super::source_file::{FileId, Language, Location, SourceFile};
 use super::{extent, yaml_extent};
-use crate::model::Origin;
+use crate::model::{Finding, Origin};
 use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
@@ -54,6 +54,16 @@ impl SourceMap {
     /// Who knows how examples are spelt.
     pub fn spell_with(&mut self, speller: Speller) {
         self.speller = Some(speller);
+    }
+
+    /// What to do about a finding, in the language of what it is about: where it stands in the deployment, of what else it points at.
+    pub fn told_help<'f>(&self, finding: &'f Finding) -> Option<Cow<'f, str>> {
+        let elsewhere = |at: &Origin| self.file_of(*at).is_some_and(|file| file != FileId(0));
+        let at = match elsewhere(&finding.origin) {
+            true => None,
+            false => finding.labels.iter().map(|label| label.origin).find(elsewhere),
+        };
+        finding.help.as_deref().map(|help| self.told(at.unwrap_or(finding.origin), help))
     }
 
     /// A text of a finding, with its examples in the language of the file in which `at` stands; in the first one, the deployment,

@@ -113,7 +113,10 @@ impl Resolve<'_> {
         if (subsystem.own.platform, &subsystem.own.platform_options) != (own.platform, &own.platform_options) {
             let message = format!("`{name}` is written for another platform than `{}`", own.platform);
             let finding = Finding::error(codes::COMPOSE_DIFFERS, message).at(subsystem.origin);
-            let help = "one platform counts for all of a deployment: write the same in both files";
+            let meant = nearest(own.platform.as_str(), std::iter::once(subsystem.own.platform.as_str()));
+            let meant = meant.filter(|near| *near != own.platform.as_str());
+            let meant = meant.map(|near| format!("did you mean `{near}`? Else ")).unwrap_or_default();
+            let help = format!("{meant}one platform counts for all of a deployment: write the same in both files");
             cx.report(finding.also(subsystem.own.key_origin("platform"), "its platform").help(help));
         }
         for (inner, outer) in &subsystem.activities {

@@ -28,6 +28,16 @@ impl Sources {
         Self::Memory(files.into_iter().map(|(path, text)| (path.into(), text.into())).collect())
     }
 
+    /// How a file is called where it is shown: without the folders that its path leads out of again, where that is the same file.
+    pub fn shown(&self, path: &Path) -> String {
+        let short = normal(path);
+        let is_same = match self {
+            Self::Memory(_) => true,
+            Self::Disk => std::fs::canonicalize(&short).ok() == std::fs::canonicalize(path).ok(),
+        };
+        if is_same { short.display().to_string() } else { path.display().to_string() }
+    }
+
     /// The text of a file: by size, then by encoding; nothing past the limit is ever read.
     ///
     /// # Errors

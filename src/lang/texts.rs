@@ -44,7 +44,7 @@ pub(super) fn open(cx: &mut Cx, from: &Sources, path: &Path, named_at: Origin) -
     };
     match from.read(path) {
         Ok(text) => {
-            let file = cx.sources.add_file(path.display().to_string(), text, language);
+            let file = cx.sources.add_file(from.shown(path), text, language);
             let whole = cx.sources.whole_file(file);
             Some((Reading { file, whole }, language))
         }

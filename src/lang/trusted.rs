@@ -119,7 +119,7 @@ fn open(
         match from.read(path) {
             Ok(text) => {
                 let name = path.display().to_string();
-                let id = cx.sources.add_file(name.clone(), text.clone(), Language::Lua);
+                let id = cx.sources.add_file(from.shown(path), text.clone(), Language::Lua);
                 ids.insert(name.clone(), id);
                 host.push((name, text.into()));
             }
@@ -154,7 +154,7 @@ fn open(
     });
     program.files = std::mem::take(&mut *loaded.borrow_mut());
     for (shown, text) in program.files.values() {
-        let id = cx.sources.add_file(shown.clone(), text.clone(), Language::Lua);
+        let id = cx.sources.add_file(from.shown(Path::new(shown)), text.clone(), Language::Lua);
         ids.insert(shown.clone(), id);
     }
     for param in &mut params.all {

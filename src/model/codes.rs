@@ -194,7 +194,8 @@ codes! {
     COMPOSE_SAFETY = "compose::safety", "a safety event does not reach a subsystem with actuators",
         "A safety event is given at once to every subsystem, to any depth, that declares one of the same name under `safety`. This \
          one has actuators and none of that name, so it would move on through an emergency. Declare it there, and let it lead to a safe \
-         configuration.";
+         configuration. Where the outer file has no `safety` at all, each subsystem is stopped by an event of its own: list the event there \
+         as well, so that one stops all of them.";
     COMPOSE_PROMISE = "compose::promise", "what a subsystem exports is touched while it need not be there",
         "What a subsystem exports is there from *up* on, or from the event that `exports: { from }` names, until it has left: it says so \
          (`leaving: { says }`) and waits until its parent lets go (`until`). The parent asks for what touches it only between these, and holds \
@@ -545,8 +546,8 @@ codes! {
         "Every request can fail. The coordinator asks for a configuration in a state where no transition waits for \
          `ID.failed` (or `ID.broken`), so after a failure it stays where it is as if nothing had happened. Add a transition \
          to a state that knows what to do: try again, go back, or stop. The same holds for `ID.reverted` of a configuration that \
-         must be confirmed (`confirm`). `ID.cancelled` needs no transition: it comes only when the request was taken back by \
-         its own undo.";
+         must be confirmed (`confirm`). `ID.cancelled` comes when the request was taken back by its own undo, or still waited \
+         when a `safe` configuration came: where one may come, hear it like `ID.failed`.";
     CHART_SLIP = "chart::slip", "a field of a trusted coordinator means nothing, and was hardly meant so",
         "A coordinator that is trusted is read as rFSM reads it: fields of your own are legal everywhere, and a global that \
          nobody has set is nil. So `evnts = {…}`, `gaurd = function …` and `entry = do_it` are no errors, but the transition is \

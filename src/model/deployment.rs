@@ -349,6 +349,13 @@ impl Deployment {
         })
     }
 
+    /// The configurations that may be asked for: what stands for a subsystem while its parent is checked is called like that, and is none.
+    pub fn named_configurations(&self) -> impl Iterator<Item = &Configuration> {
+        let stands_for =
+            |c: &&Configuration| self.subsystems.iter().any(|subsystem| ConfigId::from(subsystem.name) == c.id);
+        self.configurations.iter().filter(move |c| !stands_for(c))
+    }
+
     /// The configuration of that name.
     pub fn configuration(&self, id: ConfigId) -> Option<&Configuration> {
         self.configurations.iter().find(|c| c.id == id)

@@ -93,7 +93,8 @@ pub struct SeenStanding {
 }
 
 /// What is to be told when a subsystem that was last told to be `told` (none: it was begun since) is seen so; none: nothing new. The one rule
-/// for what runs and what is followed. One that nobody has begun yet counts as told to be down.
+/// for what runs and what is followed. One that nobody has begun yet counts as told to be down, until a
+/// transition of it takes the event that ends it.
 pub fn standing(told: Option<SubsystemStanding>, seen: SeenStanding) -> Option<SubsystemStanding> {
     let now = if seen.failed || seen.late && !seen.up {
         SubsystemStanding::Failed

@@ -9,9 +9,9 @@ use crate::stack::Requester;
 pub(super) struct Before(Vec<FrameView>);
 
 impl Session {
-    /// What is in force, before one of that name is asked for; nothing where that says nothing of it.
+    /// What is in force, before one of that name is asked for; nothing where that says nothing of it. What is safe waits for no look.
     pub(super) fn before(&self, id: ConfigId) -> Before {
-        let grouped = self.deployment().configuration(id).is_some_and(|c| c.group.is_some());
+        let grouped = self.deployment().configuration(id).is_some_and(|c| c.group.is_some() && !c.safe);
         Before(if grouped { self.frames().unwrap_or_default() } else { Vec::new() })
     }
 

@@ -150,6 +150,11 @@ impl Session {
         }
         // Of the answers about what it names, if there is such a thing, else of all.
         let subject = Verdict::split(event).map(|(subject, _)| subject).or_else(|| Some(event.rsplit_once('.')?.0));
+        // An operator may set it: that is answered, too.
+        let is_set = |name: &str| self.setting(name).is_some() || self.member(name).is_ok();
+        if Verdict::split(event).is_some_and(|(subject, _)| is_set(subject)) {
+            return None;
+        }
         let about = |name: &&str| Verdict::split(name).map(|(subject, _)| subject) == subject;
         let all = || answers.iter().map(EventName::as_str);
         let near: Vec<&str> = match all().any(|name| about(&name)) {

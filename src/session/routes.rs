@@ -159,6 +159,8 @@ pub(super) struct ToConfigurator {
     pub untold: bool,
     /// The event that begins the deployment was delivered, and nothing has moved since.
     pub begins: bool,
+    /// The event that ends the subsystem of that path was.
+    pub ends: Option<Ident>,
 }
 
 impl Listener for ToConfigurator {
@@ -196,10 +198,8 @@ impl Listener for ToConfigurator {
                 }),
             }
         }
-        if let Some(junction) = self.junction.upgrade()
-            && let Some(subsystems) = junction.subsystems().filter(|_| !requests.requests.is_empty())
-        {
-            subsystems.asks(self.name);
+        if !requests.requests.is_empty() {
+            self.of_subsystems(|subsystems, _| subsystems.asks(self.name));
         }
         if let Some(configurator) = self.configurator() {
             // A full queue answers every request itself.
@@ -220,6 +220,7 @@ impl Listener for ToConfigurator {
         let Some(junction) = self.junction.upgrade() else { return };
         self.begins = junction.begins(event);
         let led = junction.subsystems().and_then(|subsystems| subsystems.takes_up(self.name, event));
+        self.ends = led.and_then(|(path, ends)| ends.then_some(path));
         if let Some(configurator) = self.configurator() {
             if let Some((path, ends)) = led {
                 configurator.leaving_inside(path, ends);
@@ -236,6 +237,9 @@ impl Listener for ToConfigurator {
         {
             configurator.leaving(false);
         }
+        if let Some(path) = self.ends.take() {
+            self.of_subsystems(|subsystems, _| subsystems.ends(path));
+        }
         let is_down = self.down.is_some_and(|down| active.contains(&down));
         self.untold = is_down && !self.is_down;
         self.is_down = is_down;
@@ -245,16 +249,12 @@ impl Listener for ToConfigurator {
     }
 
     fn unmatched(&mut self, _: EventName) {
-        self.begins = false;
+        (self.begins, self.ends) = (false, None);
     }
 
     fn taken_up(&mut self, ticket: u64, delivered: Delivered) {
         self.hub.taken_up(ticket, (delivered == Delivered::Taken).then_some(self.name));
-        if let Some(junction) = self.junction.upgrade()
-            && let Some(subsystems) = junction.subsystems()
-        {
-            subsystems.tell_ignored(&self.hub, &junction);
-        }
+        self.of_subsystems(|subsystems, junction| subsystems.tell_ignored(&self.hub, junction));
     }
 
     fn stale(&mut self, _: &Chart, event: EventName, _: Tag) {
@@ -263,11 +263,7 @@ impl Listener for ToConfigurator {
 
     fn rested(&mut self) {
         self.tell_down();
-        if let Some(junction) = self.junction.upgrade()
-            && let Some(subsystems) = junction.subsystems()
-        {
-            subsystems.look(self.name, &self.hub, &junction);
-        }
+        self.of_subsystems(|subsystems, junction| subsystems.look(self.name, &self.hub, junction));
         // An event that moves nothing is written down nowhere: without this, who waits for "up" would not look again.
         self.hub.wake();
     }
@@ -289,6 +285,15 @@ impl Listener for ToConfigurator {
 impl ToConfigurator {
     fn configurator(&self) -> Option<ConfiguratorHandle> {
         self.junction.upgrade().and_then(|j| lock(&j.configurator).clone())
+    }
+
+    /// Has those know who know how subsystems stand, if there are any.
+    fn of_subsystems(&self, know: impl FnOnce(&Subsystems, &Junction)) {
+        if let Some(junction) = self.junction.upgrade()
+            && let Some(subsystems) = junction.subsystems()
+        {
+            know(subsystems, &junction);
+        }
     }
 
     /// Has it stand in the queue that the *down* state was entered, if it was.

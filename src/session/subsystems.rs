@@ -240,6 +240,13 @@ impl Subsystems {
         Some((*path, event == known.ends))
     }
 
+    /// A transition has taken the event that ends a subsystem: where nobody had begun that, it is told all the same when it is down.
+    pub fn ends(&self, path: Ident) {
+        if let Some(at) = self.all.iter().position(|known| known.path == path) {
+            lock(&self.lives)[at].told.take_if(|told| *told == SubsystemStanding::Down);
+        }
+    }
+
     /// All coordinators of a subsystem are down, and nothing is left of it.
     pub fn emptied(&self, path: Ident, hub: &Hub, junction: &Junction) {
         if let Some(at) = self.all.iter().position(|known| known.path == path) {

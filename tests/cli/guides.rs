@@ -7,10 +7,11 @@
 //! * `check: FILE`: a file of examples/pair but for its comments, which is accepted so, and with which the story there ends well.
 //! * `part of: FILE`: lines of a file of examples/pair.
 //! * `file: FILE`: a file of this project, whole.
+//! * `story: FILE`: all that a script of this project prints in simulated time.
 //! * `types`: what a deployment may have under `types`.
 //! * `console: FILE`: what commands print while that file of examples/pair is deployed, but for times.
 
-use crate::demo::Demo;
+use crate::demo::{Demo, at_home};
 use crate::hierarchy::{DeployedCell, cell, example, timeless};
 
 const ROOT: &str = env!("CARGO_MANIFEST_DIR");
@@ -73,6 +74,13 @@ fn done(mark: &str, text: &str) -> String {
         "file" => {
             let file = std::fs::read_to_string(format!("{ROOT}/{of}")).expect("the file");
             assert_eq!(text, file, "{of}");
+            String::new()
+        }
+        "story" => {
+            let ran = at_home(&["run", of, "--clock", "simulated"]);
+            let (command, printed) = text.split_once('\n').expect("a command, and what it prints");
+            assert_eq!(command, format!("$ davit run {of} --clock simulated"));
+            assert_eq!((ran.code, ran.out.as_str()), (0, printed), "{}", ran.err);
             String::new()
         }
         "types" => {
@@ -143,7 +151,7 @@ fn the_blocks_on_scripts() {
 
 #[test]
 fn the_blocks_on_coordinators() {
-    assert!(executed("coordinators", true) > 0);
+    assert!(executed("coordinators", true) > 1);
 }
 
 #[test]

@@ -31,6 +31,7 @@ mod listing;
 mod lost;
 mod monitor;
 mod motion;
+mod never_begun;
 mod part;
 mod recovery;
 mod resting;

@@ -191,6 +191,48 @@ fn a_parent_is_told_the_names_that_it_may_use() {
     }
     let types = said("pair.yaml", "types: {}\n", "");
     assert!(types.contains("add `types: {}`"), "{types}");
+    // Whom nobody begins, or ends, is named, though the way that something fails leads on.
+    let begun = said("pair_coordinator.lua", "\"left/e_start\", \"right/e_start\"", "\"left/e_start\"");
+    let raises = "no coordinator raises `right/e_start`, which begins `right`: raise it on the way";
+    assert!(
+        begun.contains(raises) && begun.contains("stops at `root.raising.left` and never reaches `joined`"),
+        "{begun}"
+    );
+    let ended = said("pair_coordinator.lua", "\"left/e_shutdown\", \"right/e_shutdown\"", "\"left/e_shutdown\"");
+    let raises = "no coordinator raises `right/e_shutdown`, which ends `right`: raise it on the way";
+    assert!(ended.contains(raises) && !ended.contains("`idle`, `idle`"), "{ended}");
+    // What stands for a subsystem while its parent is checked is no configuration.
+    for (file, from, to) in [
+        ("pair.yaml", "types: {}\n", "types: {}\noperator: [left]\n"),
+        ("pair_coordinator.lua", "joined   = state {}", "joined   = state { config = \"left\" }"),
+    ] {
+        let ids = said(file, from, to);
+        assert!(ids.contains("there is no configuration `left`"), "{to}: {ids}");
+        assert!(!ids.contains("`right`"), "{to}: {ids}");
+    }
+}
+
+#[test]
+fn an_answer_about_what_an_operator_sets_is_waited_for_also_where_a_configuration_is_called_like_it() {
+    let configurations = "ConfiguratorConf {
+      base = Configuration { create('base', 'Unit'), post_conf_state = { 'base:running' } },
+    }";
+    let script = "deploy('deployment.yaml')
+      set('base.k', 2.0) wait_answer('base.k.ok', 1)
+      undo('base.k') wait_answer('base.k.undone', 1)
+      shutdown()";
+    let deployment = "davit: 1
+name: small
+platform: simulated
+types: { Unit: { properties: { k: { type: float, default: 1.0 } } } }
+configurations: [conf.lua]
+coordinator: coordinator.lua
+operator: [base.k]
+deploy:   { event: e_start, up: up, within_s: 5 }
+shutdown: { event: e_stop, down: idle, within_s: 5 }
+";
+    let ran = crate::small::run(deployment, configurations, script);
+    assert_eq!(ran.code, 0, "{}{}", ran.out, ran.err);
 }
 
 #[test]

@@ -5,11 +5,11 @@ use mlua::{Error, FromLuaMulti, Lua, MultiValue, Result};
 
 /// Every function: its name, how it is called, and what it takes at most.
 const CALLS: &[(&str, &str, usize)] = &[
-    ("deploy", "deploy(\"FILE\")", 2),
-    ("raise", "raise(\"EVENT\")", 2),
-    ("apply", "apply(\"CONFIGURATION\")", 2),
-    ("undo", "undo()` or `undo(\"CONFIGURATION\")", 2),
-    ("set", "set(\"COMPONENT.MEMBER\", VALUE)", 3),
+    ("deploy", "deploy(\"FILE\")` or `deploy(\"FILE\", { replay = true })", 2),
+    ("raise", "raise(\"EVENT\")` or `raise(\"EVENT\", { to = \"COORDINATOR\" })", 2),
+    ("apply", "apply(\"CONFIGURATION\")` or `apply(\"CONFIGURATION\", { force = true })", 2),
+    ("undo", "undo()` or `undo(\"CONFIGURATION\", { force = true })", 2),
+    ("set", "set(\"COMPONENT.MEMBER\", VALUE, { force = true })", 3),
     ("commit", "commit()` or `commit{ force = true }", 1),
     ("drift", "drift()", 0),
     ("recover", "recover(\"back\")` or `recover(\"accept\")", 1),

@@ -89,7 +89,7 @@ fn read(shared: &SharedRecorder, name: &str, line: u32) -> Option<(String, Readi
     }
     match from.read(&path) {
         Ok(text) if !text.starts_with('\u{1b}') => {
-            let file = recorder.cx.sources.add_file(path.display().to_string(), text.clone(), Language::Lua);
+            let file = recorder.cx.sources.add_file(from.shown(&path), text.clone(), Language::Lua);
             let whole = recorder.cx.sources.whole_file(file);
             Some((text, Reading { file, whole }))
         }
