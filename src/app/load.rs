@@ -6,7 +6,7 @@ use crate::diagnostics::SourceMap;
 use crate::lang::{self, LoadOptions, Loaded};
 use crate::libraries::monitors;
 use crate::model::codes::DEPLOY_UNKNOWN_LIBRARY;
-use crate::model::finding::did_you_mean;
+use crate::model::finding::{and_also, did_you_mean};
 use crate::model::{Catalogue, Deployment, Finding, Findings, Ident};
 use crate::runtime::Libraries;
 use std::collections::BTreeMap;
@@ -90,9 +90,9 @@ fn read_loaded(loaded: Loaded, extensions: &Extensions, other: Option<Ident>) ->
                 Finding::error(DEPLOY_UNKNOWN_LIBRARY, format!("this program has no component library `{name}`"))
                     .at(deployment.key_origin("libraries"))
                     .path("libraries")
-                    .help(format!(
-                        "{}; others are brought by a program of one's own, as `examples/scara` is one (`docs/scara.md`)",
-                        did_you_mean(name.as_str(), "libraries", known)
+                    .help(and_also(
+                        &did_you_mean(name.as_str(), "libraries", known),
+                        "others are brought by a program of one's own, as `examples/scara` is one (`docs/scara.md`)",
                     )),
             );
             return Err(Refused { findings, sources: loaded.sources, unreadable: false });

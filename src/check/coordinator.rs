@@ -6,7 +6,7 @@ use crate::model::codes::{
     COORD_ANSWER_NEVER_COMES, COORD_NEVER_EMITTED, COORD_UNKNOWN_ANSWER, COORD_UNKNOWN_REQUEST, DEPLOY_EVENT_UNHEARD,
     DEPLOY_UNKNOWN_STATE,
 };
-use crate::model::finding::{did_you_mean, nearest};
+use crate::model::finding::{and_also, did_you_mean, nearest};
 use crate::model::statechart::is_internal;
 use crate::model::{Ask, ConfigId, Deployment, EventName, Finding, Findings, Raise, Verdict};
 use crate::statechart::{Chart, EdgeId, EventId, FindError, NodeId, RaiseMoment};
@@ -143,17 +143,26 @@ fn raised(deployment: &Deployment, chart: &Chart, known: &KnownEvents<'_>, findi
         } else {
             format!("`{}` is neither a configuration nor an event that the deployment emits", site.name)
         };
+        // Either of the two may be the slip.
+        let unraised = deployment.emits.iter().filter(|(event, _)| !chart.raises().iter().any(|s| s.name == *event));
+        let unraised: Vec<_> = unraised.filter(|_| undo.is_empty()).collect();
+        let near = nearest(id, unraised.iter().map(|(event, _)| event.as_str()));
+        let other = unraised.iter().find(|(event, _)| near == Some(event.as_str()));
+        let finding = Finding::error(COORD_UNKNOWN_REQUEST, message)
+            .at(site.origin)
+            .labelled("raised here")
+            .path(place(chart, site.when));
         findings.push(
-            Finding::error(COORD_UNKNOWN_REQUEST, message)
-                .at(site.origin)
-                .labelled("raised here")
-                .path(place(chart, site.when))
-                .also(deployment.key_origin("configurations"), "the configurations of the deployment")
-                .help(match known.waited_for_as(id).filter(|_| undo.is_empty()) {
-                    Some(near) => format!("did you mean `{near}`, which is waited for and nobody raises?"),
-                    None if id.contains('.') => help,
-                    None => format!("{help}; an event that is meant to leave the deployment is listed under `emits`"),
-                }),
+            match other {
+                Some((event, at)) => finding.also(*at, format!("nothing raises `{event}`")),
+                None => finding.also(deployment.key_origin("configurations"), "the configurations of the deployment"),
+            }
+            .help(match known.waited_for_as(id).filter(|_| undo.is_empty()) {
+                Some(near) => format!("did you mean `{near}`, which is waited for and nobody raises?"),
+                None if id.contains('.') => help,
+                None if other.is_some() => and_also(&help, &format!("else list `{id}` under `emits`")),
+                None => and_also(&help, "an event that is meant to leave the deployment is listed under `emits`"),
+            }),
         );
     }
     let raised: BTreeSet<EventName> = chart.raises().iter().map(|s| s.name).collect();

@@ -193,10 +193,8 @@ impl Args {
 fn tell_warnings(out: &Output, input: &CommandInput, checked: &Checked) {
     let warnings = checked.findings.iter().filter(|finding| finding.severity == Severity::Warning).count();
     if warnings > 0 {
-        let set: String = input.parameters.set.iter().map(|set| format!(" --set {set}")).collect();
-        let shows = format!("`davit check {}{set}` shows", input.file.display());
         let them = if warnings == 1 { "it" } else { "them" };
-        out.error(format!("{}: {shows} {them}\n", count(warnings, "warning")));
+        out.error(format!("{}: {} shows {them}\n", count(warnings, "warning"), input.checked_by()));
     }
 }
 

@@ -6,7 +6,7 @@ use super::output::{Output, Style, Table, text_columns, wrapped};
 use super::{CommandContext, CommandFailure, CommandResult, Run};
 use crate::lang::schema::{self, ReferenceEntry};
 use crate::model::codes::{self, CLI_UNKNOWN_CODE, PAGES, Page};
-use crate::model::finding::did_you_mean;
+use crate::model::finding::{and_also, did_you_mean};
 use serde::Serialize;
 
 /// Explain a finding (what happened, why it is refused, what to do), or a key of the files (what it means, its form, its unit, its
@@ -159,7 +159,7 @@ fn unknown(what: &str) -> CommandFailure {
         ),
     };
     let known = PAGES.iter().map(|page| page.code.0).chain(schema::names());
-    CommandFailure::no(CLI_UNKNOWN_CODE, message, format!("{}; {list}", did_you_mean(name, "codes and keys", known)))
+    CommandFailure::no(CLI_UNKNOWN_CODE, message, and_also(&did_you_mean(name, "codes and keys", known), &list))
 }
 
 /// What a key, a table or a word is, for people.

@@ -82,7 +82,16 @@ impl CommandInput {
             following.tell(far);
             Ok(())
         };
-        Ok(app::check_while(read, false, &goes_on)?)
+        app::check_while(read, false, &goes_on).map_err(|refused| {
+            let others = Some(self.checked_by());
+            CommandFailure { others, ..refused.into() }
+        })
+    }
+
+    /// The command that shows all that is found in it.
+    pub fn checked_by(&self) -> String {
+        let set: String = self.parameters.set.iter().map(|set| format!(" --set {set}")).collect();
+        format!("`davit check {}{set}`", self.file.display())
     }
 }
 
@@ -218,7 +227,7 @@ pub fn coordinators(
 /// What was found instead of what is read: usage where a text could not be read at all.
 pub fn unread(findings: Findings, sources: SourceMap, unreadable: bool) -> CommandFailure {
     let exit = if unreadable { Exit::Usage } else { Exit::No };
-    CommandFailure { exit, findings, sources }
+    CommandFailure { exit, findings, sources, others: None }
 }
 
 /// Whether a file is a deployment: YAML with the key `davit` at the beginning of a line.

@@ -157,12 +157,14 @@ pub struct CommandFailure {
     pub findings: Findings,
     /// The texts the findings are about.
     pub sources: SourceMap,
+    /// What shows the findings that refuse nothing: people are told that, and not them. None: they are told all.
+    pub others: Option<String>,
 }
 
 impl CommandFailure {
     /// Findings about these texts; the answer is no.
     pub fn found(findings: Findings, sources: SourceMap) -> Self {
-        Self { exit: Exit::No, findings, sources }
+        Self { exit: Exit::No, findings, sources, others: None }
     }
 
     /// One error; the answer is no.
@@ -275,11 +277,14 @@ enum FailureAnswer {
 
 /// Prints why a command did not do its work; answers how it ended.
 fn tell(out: Output, failure: CommandFailure, answers: FailureAnswer) -> Exit {
-    let CommandFailure { exit, findings, sources } = failure;
+    let CommandFailure { exit, findings, sources, others } = failure;
     last_words::say(move || {
         let answer = || serde_json::json!({ "ok": false, "findings": to_json(&findings, &sources) });
         match answers {
-            FailureAnswer::Text => out.findings(&findings, &sources),
+            FailureAnswer::Text => match others {
+                Some(shows) => out.refused(&findings, &sources, &shows),
+                None => out.findings(&findings, &sources),
+            },
             FailureAnswer::Json => out.json(&answer()),
             FailureAnswer::JsonLine => out.json_line(&answer()),
         }

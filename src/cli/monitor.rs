@@ -12,7 +12,7 @@ use crate::model::codes::{
     CLI_UNKNOWN_MONITOR, SAMPLES_COLUMNS, SAMPLES_GAP, SAMPLES_MERGED, SAMPLES_MISSING, SAMPLES_NAN, SAMPLES_RENAMED,
     SAMPLES_UNREADABLE, SAMPLES_UNUSED,
 };
-use crate::model::finding::{did_you_mean, has_errors, nearest};
+use crate::model::finding::{and_also, did_you_mean, has_errors, nearest};
 use crate::model::{Finding, Findings, Monitor, Origin};
 use crate::monitor::replay::{MonitorEvent, Replay, Tally};
 use crate::monitor::table::{Columns, TableProblem, decimal, empty, is_blank};
@@ -155,7 +155,7 @@ impl Run for Args {
             findings.push(
                 Finding::error(SAMPLES_MISSING, format!("the recording has no column `{input}`"))
                     .at(meant.map_or(header, |column| sources.within(header, column)))
-                    .help(format!("{near}; `--column {input}=NAME` takes it from a column of another name")),
+                    .help(and_also(&near, &format!("`--column {input}=NAME` takes it from a column of another name"))),
             );
         }
         let looked_past = replay.unused().first().map_or(header, |column| sources.within(header, column));

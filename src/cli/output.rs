@@ -5,7 +5,8 @@
 //! says so.
 
 use crate::diagnostics::{SourceMap, render};
-use crate::model::Finding;
+use crate::model::finding::count;
+use crate::model::{Finding, Severity};
 use serde::Serialize;
 use std::fmt::Display;
 use std::fs::File;
@@ -101,6 +102,20 @@ impl Output {
     pub fn findings(&self, findings: &[Finding], sources: &SourceMap) {
         if !findings.is_empty() {
             self.error(render(findings, sources, self.stderr_color));
+        }
+    }
+
+    /// Those of findings that refuse something to stderr, and of the others how many `shows` shows.
+    pub fn refused(&self, findings: &[Finding], sources: &SourceMap, shows: &str) {
+        let (errors, others): (Vec<Finding>, Vec<Finding>) = findings.iter().cloned().partition(Finding::is_error);
+        self.findings(&errors, sources);
+        let warnings = others.iter().filter(|finding| finding.severity == Severity::Warning).count();
+        let of = |number: usize, what: &str| (number > 0).then(|| count(number, what));
+        let parts: Vec<String> =
+            [of(warnings, "warning"), of(others.len() - warnings, "note")].into_iter().flatten().collect();
+        if !parts.is_empty() {
+            let them = if others.len() == 1 { "it" } else { "them" };
+            self.error(format!("{}: {shows} shows {them}\n", parts.join(", ")));
         }
     }
 

@@ -234,6 +234,9 @@ fn tell(script: &Path, failure: ScriptFailure) -> CommandFailure {
             message,
             "the table of figures has all of them; `--samples DIR` writes down what was recorded",
         ),
-        ScriptFailure::Refused { refused, .. } => (*refused).into(),
+        ScriptFailure::Refused { path, refused } => {
+            let others = Some(format!("`davit check {}`", path.display()));
+            CommandFailure { others, ..(*refused).into() }
+        }
     }
 }

@@ -86,6 +86,7 @@ pub fn load(path: &Path, options: &LoadOptions) -> Loaded {
 pub fn load_from(from: &Sources, path: &Path, options: &LoadOptions) -> Loaded {
     let mut cx = Cx::default();
     let deployment = whole::deployment(&mut cx, from, path, options);
+    cx.told_once();
     let (deployment, but_for) = match deployment {
         Some(deployment) if !crate::model::finding::has_errors(&cx.findings) => (Some(deployment), None),
         other => (None, other.filter(|_| !cx.unreadable && concern::only_configurations(&cx.findings))),

@@ -7,6 +7,7 @@ use crate::diagnostics::{FileId, Language, SourceMap};
 use crate::limits;
 use crate::model::finding::{did_you_mean, nearest};
 use crate::model::{Finding, Findings, Origin, codes};
+use rustc_hash::FxHashSet;
 use std::borrow::Cow;
 
 /// A piece of text with the place where it was written.
@@ -106,6 +107,16 @@ impl Default for Cx {
 }
 
 impl Cx {
+    /// Of findings with the same words about the same place one is kept: a file that is several subsystems is read for each.
+    pub fn told_once(&mut self) {
+        let mut told = FxHashSet::default();
+        let sources = &self.sources;
+        self.findings.retain(|finding| {
+            let Some(at) = sources.locate(finding.origin) else { return true };
+            told.insert((finding.code, finding.message.clone(), sources.file(at.file).name.clone(), at.line, at.column))
+        });
+    }
+
     /// Adds a finding, unless there are too many.
     pub fn report(&mut self, finding: Finding) {
         if self.findings.len() < limits::FINDINGS {

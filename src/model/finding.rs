@@ -182,7 +182,8 @@ pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Opti
         .map(|(_, candidate)| candidate)
 }
 
-/// Whether two letters of a short word stand the other way round (`scr`), or one without vowels is written out (`target`, of `tgt`).
+/// Whether a letter of a short word is missing (`mx`), two of it stand the other way round (`scr`), or one without vowels is written out
+/// (`target`, of `tgt`).
 fn is_short_for(name: &str, candidate: &str) -> bool {
     let sorted = |word: &str| {
         let mut letters: Vec<char> = word.chars().collect();
@@ -190,13 +191,17 @@ fn is_short_for(name: &str, candidate: &str) -> bool {
         letters
     };
     let swapped = || sorted(name) == sorted(candidate) && strsim::osa_distance(name, candidate) == 1;
+    let shorter = || {
+        let begins = name.chars().next() == candidate.chars().next();
+        begins && name.len() == 2 && candidate.len() == 3 && strsim::osa_distance(name, candidate) == 1
+    };
     let written_out = || {
         let mut letters = name.chars().peekable();
         letters.peek().copied() == candidate.chars().next()
             && !candidate.contains(['a', 'e', 'i', 'o', 'u'])
             && candidate.chars().all(|wanted| letters.any(|letter| letter == wanted))
     };
-    candidate.len() > 2 && (swapped() || written_out())
+    candidate.len() > 2 && (shorter() || swapped() || written_out())
 }
 
 /// Which of two words was meant, where it must be one of them: the one with fewer slips of the finger, else the first.
@@ -232,6 +237,15 @@ pub fn did_you_mean<'a>(name: &str, what: &str, known: impl IntoIterator<Item = 
     let shown: Vec<String> = known.iter().take(8).map(|k| format!("`{k}`")).collect();
     let more = if known.len() > 8 { format!(" and {} more", known.len() - 8) } else { String::new() };
     format!("known {what}: {}{more}", shown.join(", "))
+}
+
+/// A help with more behind it, which begins a sentence of its own behind a question.
+pub fn and_also(help: &str, more: &str) -> String {
+    let mut letters = more.chars();
+    match (help.ends_with('?'), letters.next()) {
+        (true, Some(first)) => format!("{help} {}{}", first.to_uppercase(), letters.as_str()),
+        _ => format!("{help}; {more}"),
+    }
 }
 
 #[cfg(test)]

@@ -79,6 +79,22 @@ fn who_deploys_hears_that_there_are_warnings() {
     assert!(said.contains(told) && said.contains(&format!("{warnings} warning")), "{said}");
 }
 
+#[test]
+fn who_deploys_what_is_refused_is_shown_why_and_how_much_more_there_is() {
+    let demo = Demo::new();
+    demo.replace("coordinator.lua", "\"create_all.failed\", \"connect_all.failed\"", "\"connect_all.failed\"");
+    demo.replace("configurations.lua", "property_set(\"source.k\", 9)", "property_set(\"source.k\", 99)");
+    demo.write("story.lua", "deploy('deployment.yaml')");
+    for args in [["deploy", "deployment.yaml"], ["run", "story.lua"]] {
+        let ran = demo.run(&args);
+        let told = ran.err.contains("conf::bad_value") && ran.err.contains(": `davit check deployment.yaml` shows ");
+        assert!(ran.code == 1 && told && !ran.err.contains('⚠'), "{args:?}: {}", ran.err);
+    }
+    let json = demo.run(&["deploy", "deployment.yaml", "--json"]).json();
+    let warned = json["findings"].as_array().is_some_and(|all| all.iter().any(|one| one["severity"] == "warning"));
+    assert!(warned, "programs are told all: {json}");
+}
+
 fn scripted(text: &str) -> Ran {
     let demo = Demo::new();
     demo.write("story.lua", text);
@@ -191,6 +207,9 @@ fn a_parent_is_told_the_names_that_it_may_use() {
     }
     let types = said("pair.yaml", "types: {}\n", "");
     assert!(types.contains("add `types: {}`"), "{types}");
+    // A file that is two subsystems is read twice, and what is wrong in it told once.
+    let once = said("robot.yaml", "max: 2.0", "mx: 2.0");
+    assert!(once.matches("has no `mx`").count() == 1 && once.contains("did you mean `max`?"), "{once}");
     // Whom nobody begins, or ends, is named, though the way that something fails leads on.
     let begun = said("pair_coordinator.lua", "\"left/e_start\", \"right/e_start\"", "\"left/e_start\"");
     let raises = "no coordinator raises `right/e_start`, which begins `right`: raise it on the way";
