@@ -159,7 +159,7 @@ fn unknown(what: &str) -> CommandFailure {
         ),
     };
     let known = PAGES.iter().map(|page| page.code.0).chain(schema::names());
-    CommandFailure::no(CLI_UNKNOWN_CODE, message, and_also(&did_you_mean(name, "codes and keys", known), &list))
+    CommandFailure::no(CLI_UNKNOWN_CODE, message, and_also(&did_you_mean(name, "codes and keys", known), list))
 }
 
 /// What a key, a table or a word is, for people.
