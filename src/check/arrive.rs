@@ -260,8 +260,9 @@ impl Product<'_> {
         if let Some(world) = self.worlds.get(state.world).filter(|_| request.scope.is_some() && !state.desk.is_empty())
         {
             let ProductState { desk, seldom, .. } = &mut *state;
+            let claims = &self.worlds.claims;
             self.desks.change(desk, |desk| {
-                world.note_gone(&request, seldom.get().safe.iter(), desk.requests_mut());
+                world.note_gone(&request, claims, seldom.get().safe.iter(), desk.requests_mut());
             });
         }
         state.change(|seldom| seldom.safe.push(request));

@@ -4,7 +4,9 @@ use super::belief::Beliefs;
 use super::reactions::{Macrostep, Reactions};
 use super::state::ProductState;
 use super::uncertain::uncertain_events;
-use crate::model::{Ask, ConfigId, Configuration, Deployment, EventName, Ident, Subsystem, SubsystemStanding};
+use crate::model::{
+    Ask, ConfigId, Configuration, Deployment, EventName, Ident, Statechart, Subsystem, SubsystemStanding,
+};
 use crate::stack::{Requester, claims};
 use crate::statechart::{Chart, compile};
 use rustc_hash::FxHashSet;
@@ -25,6 +27,10 @@ pub struct Child {
     /// What it tells when it wants to leave.
     pub leaves: Option<EventName>,
     pub down: EventName,
+    /// The event that ends it.
+    pub ends: EventName,
+    /// It may take that where nobody has begun it, and tells then when it is down.
+    pub ends_unbegun: bool,
     /// Configurations that touch what it exports.
     pub touching: FxHashSet<ConfigId>,
     /// What it may hold for itself.
@@ -56,8 +62,24 @@ impl Child {
             let (begins, down) = (own.deploy.event.within(path), SubsystemStanding::Down.event(path));
             let (holds, unbidden) = (subsystem.holds.clone(), !subsystem.holds.is_empty() && is_unbidden(subsystem));
             let (up, beliefs) = (SubsystemStanding::Up.event(path), None);
+            let (ends, ends_unbegun) = (own.shutdown.event.within(path), ends_unbegun(own));
             let uncertain = uncertain_events(own).into_iter().map(|event| event.within(path)).collect();
-            Self { path, begins, from, up, until, leaves, down, touching, holds, unbidden, uncertain, beliefs }
+            Self {
+                path,
+                begins,
+                from,
+                up,
+                until,
+                leaves,
+                down,
+                ends,
+                ends_unbegun,
+                touching,
+                holds,
+                unbidden,
+                uncertain,
+                beliefs,
+            }
         };
         deployment.subsystems.iter().take(MOST_CHILDREN).map(of).collect()
     }
@@ -74,12 +96,34 @@ pub fn promised(at: usize) -> u64 {
 /// One was begun anew before it was heard to be down: what is heard then may be of the life before.
 pub const DOUBT: u64 = 1 << 63;
 
+/// Whether the event that ends it leads a coordinator of it somewhere, wherever that can come to before it is begun: as far as that is known from
+/// where it is at first.
+fn ends_unbegun(own: &Deployment) -> bool {
+    let leads = |chart: Chart| {
+        let mut reactions = Reactions::new(own, &chart, &[], Requester::Operator, None);
+        let first = reactions.enter();
+        first.is_some_and(|first| reactions.react(first.leaf, chart.event(own.shutdown.event)).taken)
+    };
+    own.own_part().charts().filter_map(|chart| compile(chart).0).any(leads)
+}
+
+/// A coordinator of a file that is not in its *down* state before anybody begins it, by its number.
+pub fn not_down_at_first(own: &Deployment) -> Option<usize> {
+    let elsewhere = |(number, chart): (usize, &Statechart)| {
+        let chart: Chart = compile(chart).0?;
+        let down = chart.find(&own.coordinators[number].down).ok()?;
+        let leaf = Reactions::new(own, &chart, &[], Requester::Operator, None).enter()?.leaf;
+        (!chart.is_inside(leaf, down)).then_some(number)
+    };
+    own.charts().enumerate().find_map(elsewhere)
+}
+
 /// Whether a subsystem, or one inside it, goes somewhere from where it is down by anything but the event that begins it, or an operator may
-/// apply something there.
+/// apply something there. Where the event that ends it leads, without asking for anything, it is to be down.
 fn is_unbidden(subsystem: &Subsystem) -> bool {
     let own = &*subsystem.own;
     let wakes = |chart: &Chart| {
-        let begins = chart.event(own.deploy.event);
+        let (begins, ends) = (chart.event(own.deploy.event), chart.event(own.shutdown.event));
         let mut reactions = Reactions::new(own, chart, &[], Requester::Operator, None);
         let Some(first) = reactions.enter() else { return true };
         let applies = |step: &Macrostep| {
@@ -92,7 +136,7 @@ fn is_unbidden(subsystem: &Subsystem) -> bool {
         applies(&first)
             || others.any(|event| {
                 let step = reactions.react(first.leaf, event);
-                step.leaf != first.leaf || applies(&step)
+                step.leaf != first.leaf && event != ends || applies(&step)
             })
     };
     own.operator_applies().next().is_some()

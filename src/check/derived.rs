@@ -102,7 +102,9 @@ impl Deriving<'_, '_, '_> {
         // Whose lateness nobody waits for is not told apart from others.
         let late = told.is_none() && self.waits_for(SubsystemStanding::Failed);
         let late = SeenStanding { late, stranded: ending, ..seen };
-        let (in_time, late) = (standing(told, seen), standing(told, late));
+        // It is told once that it is not down in time, and how it stands otherwise when it is down or begun anew.
+        let over = ending && told == Some(SubsystemStanding::Stranded);
+        let (in_time, late) = (standing(told, seen).filter(|_| !over), standing(told, late));
         for now in in_time.into_iter().chain(late.filter(|late| in_time != Some(*late))) {
             let still = ending && now != SubsystemStanding::Down;
             let to = self.at(ShownPlace { told: Some(now), ending: still, ..place });
@@ -172,15 +174,16 @@ impl Deriving<'_, '_, '_> {
     /// Where it is when it has taken an event up there, `heeded` by a transition or not.
     fn after(&mut self, place: ShownPlace, event: EventName, heeded: bool) -> ShownPlace {
         let was_down = place.told == Some(SubsystemStanding::Down);
-        let begins = event == self.begins && was_down;
         let minds = self.waits_for(SubsystemStanding::Stranded);
-        let ending = minds && (event == self.ends || place.ending && event != self.begins);
-        match begins {
-            true => ShownPlace { told: None, ending, failed: Failed::Nothing, ..place },
-            // Who ends what nobody has begun is told when that is down.
-            false if event == self.ends && heeded && was_down => ShownPlace { told: None, ending, ..place },
-            false => ShownPlace { ending, ..place },
+        if event == self.begins && heeded {
+            // What has failed before may have led here.
+            let failed = if was_down { Failed::Nothing } else { place.failed };
+            return ShownPlace { told: None, ending: false, failed, ..place };
         }
+        let ends = event == self.ends && (heeded || !was_down);
+        // Who ends what nobody has begun is told when that is down.
+        let told = if ends && was_down { None } else { place.told };
+        ShownPlace { told, ending: minds && (ends || place.ending), ..place }
     }
 
     /// The events of its parent, or that might as well be, that an edge brings; empty: none.

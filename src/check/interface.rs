@@ -1,8 +1,10 @@
 //! What a deployment shows to one that it is a subsystem of, and what it says to its own subsystems, by the texts alone.
 
-use super::let_go;
 use super::universe::Universe;
-use crate::model::codes::{COMPOSE_EXPORT_DRIVEN, COMPOSE_SAFETY, COMPOSE_UNKNOWN, COMPOSE_WORD};
+use super::{children, let_go};
+use crate::model::codes::{
+    COMPOSE_EXPORT_DRIVEN, COMPOSE_NOT_DOWN_AT_FIRST, COMPOSE_SAFETY, COMPOSE_UNKNOWN, COMPOSE_WORD,
+};
 use crate::model::finding::{did_you_mean, nearest};
 use crate::model::subsystem::IGNORED;
 use crate::model::{
@@ -10,7 +12,7 @@ use crate::model::{
     SubsystemStanding,
 };
 use crate::statechart::{Chart, EventId};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 /// What is wrong with what it shows.
 pub fn check(deployment: &Deployment, universe: &Universe, charts: &[&Chart]) -> Findings {
@@ -114,6 +116,7 @@ pub fn between(own: &Deployment, charts: &[&Chart], catalogue: &Catalogue) -> Fi
     let mut findings = Vec::new();
     for subsystem in &own.subsystems {
         unheard(subsystem, charts, &mut findings);
+        findings.extend(not_down_at_first(subsystem));
         findings.extend(let_go::check(own, subsystem, charts));
         let declared: Vec<(EventName, Origin)> = own.safety.clone();
         for (event, origin) in declared {
@@ -132,25 +135,44 @@ pub fn between(own: &Deployment, charts: &[&Chart], catalogue: &Catalogue) -> Fi
             }
         }
     }
-    findings.extend(unlisted(own));
+    findings.extend(unlisted(own, catalogue));
     findings
 }
 
-/// Safety events of subsystems that no event of their deployment's own stands for: nobody can stop all of them at once.
-fn unlisted(own: &Deployment) -> Option<Finding> {
-    let mut theirs: BTreeMap<EventName, Vec<Ident>> = BTreeMap::new();
-    for subsystem in &own.subsystems {
-        subsystem.own.safety.iter().for_each(|(event, _)| theirs.entry(*event).or_default().push(subsystem.name));
-    }
-    let (event, of) = theirs.into_iter().find(|_| own.safety.is_empty())?;
-    let of: Vec<String> = of.iter().map(|name| format!("`{name}/{event}`")).collect();
-    let message = format!("there is no `safety` here: {} have to be raised one by one", of.join(", "));
-    let first = own.subsystems.first().map(|subsystem| subsystem.origin)?;
+/// A subsystem that is not down before it is begun keeps its parent from being down that has neither begun nor ended it.
+fn not_down_at_first(subsystem: &Subsystem) -> Option<Finding> {
+    let own = subsystem.own.own_part();
+    let number = children::not_down_at_first(own)?;
+    let coordinator = &own.coordinators[number];
     let message =
-        if of.len() == 1 { message.replace("have to be raised one by one", "has to be raised") } else { message };
+        format!("`{}` is not down before it is begun: it does not begin in `{}`", subsystem.name, coordinator.down);
+    let help = format!(
+        "let it begin in `{}`, or have its parent end it (`{}`) wherever that leads down",
+        coordinator.down,
+        own.shutdown.event.within(subsystem.name)
+    );
+    let finding = Finding::warning(COMPOSE_NOT_DOWN_AT_FIRST, message).at(subsystem.origin);
+    Some(finding.also(subsystem.own.key_origin("shutdown.down"), "the state that means down").help(help))
+}
+
+/// A safety event of subsystems that no event of their deployment's own stands for: nobody can stop all of them at once. One that does not reach
+/// all that need it would be refused here.
+fn unlisted(own: &Deployment, catalogue: &Catalogue) -> Option<Finding> {
+    let reaches = |event: EventName| {
+        let mut missing = Vec::new();
+        let all = own.subsystems.iter();
+        all.for_each(|subsystem| unsafe_in(subsystem, subsystem.name, event, catalogue, &mut missing));
+        missing.is_empty()
+    };
+    let declares = |of: &Subsystem, event: EventName| of.own.own_part().safety.iter().any(|(own, _)| *own == event);
+    let theirs = own.subsystems.iter().flat_map(|subsystem| subsystem.own.own_part().safety.iter());
+    let event = theirs.map(|(event, _)| *event).find(|event| own.safety.is_empty() && reaches(*event))?;
+    let of: Vec<&Subsystem> = own.subsystems.iter().filter(|subsystem| declares(subsystem, event)).collect();
+    let names: Vec<String> = of.iter().map(|subsystem| format!("`{}/{event}`", subsystem.name)).collect();
+    let raised = if names.len() == 1 { "has to be raised" } else { "have to be raised one by one" };
     Some(
-        Finding::info(COMPOSE_SAFETY, message)
-            .at(first)
+        Finding::info(COMPOSE_SAFETY, format!("there is no `safety` here: {} {raised}", names.join(", ")))
+            .at(of.first()?.origin)
             .help(format!("list `safety: [{event}]` here as well: it is heard in all subsystems then")),
     )
 }

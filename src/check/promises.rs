@@ -47,7 +47,11 @@ impl Product<'_> {
                     state.children |= DOUBT;
                 }
                 state.children |= begun(at);
-            } else if name == child.until {
+            } else if name == child.ends && child.ends_unbegun && child.beliefs.is_none() {
+                // What it tells of that, if it does, is heard.
+                state.children |= begun(at);
+            }
+            if name == child.until {
                 state.children &= !promised(at);
                 if state.children & begun(at) != 0 {
                     state.children |= released(at);
@@ -66,7 +70,9 @@ impl Product<'_> {
         let mut children = self.children.iter().enumerate();
         let told =
             |child: &Child| name.local(child.path).is_some_and(|own| !own.ends_with(crate::model::subsystem::IGNORED));
-        children.any(|(at, child)| told(child) && state.children & begun(at) == 0)
+        // Where it is known what it may tell, that says so.
+        let unknown = |child: &Child| child.beliefs.is_none() || !child.ends_unbegun;
+        children.any(|(at, child)| told(child) && unknown(child) && state.children & begun(at) == 0)
     }
 
     /// Whether it is known when an event comes that a subsystem tells.

@@ -67,6 +67,7 @@ pub const READ: &[(&str, &[Code])] = &[
             COMPOSE_UNLEFT,
             COMPOSE_UNKNOWN,
             COMPOSE_SAFETY,
+            COMPOSE_NOT_DOWN_AT_FIRST,
             COMPOSE_WORD,
             COMPOSE_EXPORT_DRIVEN,
             COMPOSE_EXCLUSIVE,

@@ -20,7 +20,7 @@ impl Product<'_> {
         }
     }
 
-    /// One of the coordinators takes an event up: it may be the one that begins its subsystem, or one that ends it and leads somewhere.
+    /// One of the coordinators takes an event up: it may be the one that begins its subsystem, or ends it, and leads somewhere.
     pub(super) fn begins_subsystem(&mut self, state: &mut ProductState, number: usize, event: EventId) {
         if self.watched.is_empty() {
             return;
@@ -28,8 +28,8 @@ impl Product<'_> {
         let Some(name) = self.members[number].name_of(event) else { return };
         let leads = self.members[number].takes(state.leaves[number], name);
         for (at, watched) in self.watched.iter().enumerate().filter(|(_, watched)| watched.members.contains(&number)) {
-            let anew = name == watched.begins || leads && name == watched.ends;
-            if anew && told(state, at) == Some(SubsystemStanding::Down) {
+            let was_down = told(state, at) == Some(SubsystemStanding::Down);
+            if leads && (name == watched.begins || name == watched.ends && was_down) {
                 tell(state, at, None);
             }
         }

@@ -12,7 +12,7 @@ use super::trace::TraceStep;
 use super::tried::{Goal, Way};
 use crate::limits;
 use crate::model::codes::{DEPLOY_LEFTOVERS, DEPLOY_NEVER_DOWN, DEPLOY_NEVER_UP, STACK_SQUASHED};
-use crate::model::{Catalogue, Code, Deployment, EventName, Finding, Origin, Severity};
+use crate::model::{Catalogue, Code, Deployment, Finding, Origin, Severity};
 use crate::statechart::{Chart, NodeId};
 use std::collections::BTreeSet;
 
@@ -199,18 +199,19 @@ fn stops(product: &Product<'_>, way: &Way, code: Code, key: &str, goal: Goal, wh
     finding.help(help).at(deployment.key_origin(key)).path(key)
 }
 
-/// The subsystems that nobody ever tells what begins them, or ends them: what to do about it.
+/// The subsystems that nobody ever tells what begins them, or ends them: what to do about it. Of one file only its own are asked for.
 fn untold(product: &Product<'_>, code: Code) -> Option<String> {
-    let raised: BTreeSet<EventName> =
-        product.members.iter().flat_map(|member| member.chart.raises()).map(|site| site.name).collect();
-    let subsystems = product.deployment.all_subsystems().into_iter();
+    let deployment = product.deployment;
+    let whole = deployment.own.is_some();
+    let subsystems = deployment.all_subsystems().into_iter();
+    let subsystems = subsystems.filter(|(path, _)| whole || deployment.subsystems.iter().any(|own| own.name == *path));
     let all = subsystems.map(|(path, subsystem)| {
         let own = &subsystem.own;
         let event = if code == DEPLOY_NEVER_UP { own.deploy.event } else { own.shutdown.event };
         (path, event.within(path))
     });
     let does = if code == DEPLOY_NEVER_UP { "begins" } else { "ends" };
-    let untold = all.filter(|(_, event)| !raised.contains(event)).take(4);
+    let untold = all.filter(|(_, event)| !deployment.charts().any(|chart| chart.raises(event.as_str()))).take(4);
     let untold: Vec<String> = untold.map(|(path, event)| format!("`{event}`, which {does} `{path}`")).collect();
     (!untold.is_empty()).then(|| format!("no coordinator raises {}: raise it on the way", untold.join(", nor ")))
 }

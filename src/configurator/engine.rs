@@ -323,7 +323,7 @@ impl Engine {
                         _ => None,
                     });
                     let waiting = self.safety.waiting.iter().chain(applied);
-                    self.world.note_gone(&safe, waiting, self.desk.requests_mut());
+                    self.world.note_gone(&safe, &self.given.claims, waiting, self.desk.requests_mut());
                     self.safety.waiting.push_back(safe);
                 }
             }

@@ -191,6 +191,10 @@ codes! {
     COMPOSE_WORD = "compose::word", "an event has a name that is told by itself",
         "`up`, `down`, `failed` and `stranded` are told to a parent of each of its subsystems without anybody raising them \
          (`left/up`), and so is what ends in `.ignored`. A deployment cannot emit or accept an event called so. Give it another name.";
+    COMPOSE_NOT_DOWN_AT_FIRST = "compose::not_down_at_first", "a subsystem is not down before it is begun",
+        "A deployment is down when all its coordinators are, those of its subsystems too. A subsystem that does not begin in the state that its file \
+         names in `shutdown: { down }` is not down before it is begun, or ended: a parent that comes to where it is down without either is stopped \
+         without its coordinator. Let the subsystem begin in that state, or let its parent end it on every way down, also where it was not begun.";
     COMPOSE_SAFETY = "compose::safety", "a safety event does not reach a subsystem with actuators",
         "A safety event is given at once to every subsystem, to any depth, that declares one of the same name under `safety`. This \
          one has actuators and none of that name, so it would move on through an emergency. Declare it there, and let it lead to a safe \

@@ -94,16 +94,16 @@ pub struct SeenStanding {
 
 /// What is to be told when a subsystem that was last told to be `told` (none: it was begun since) is seen so; none: nothing new. The one rule
 /// for what runs and what is followed. One that nobody has begun yet counts as told to be down, until a
-/// transition of it takes the event that ends it.
+/// transition of it takes the event that ends it; one that is begun anew counts as told nothing.
 pub fn standing(told: Option<SubsystemStanding>, seen: SeenStanding) -> Option<SubsystemStanding> {
-    let now = if seen.failed || seen.late && !seen.up {
+    let now = if seen.stranded && !seen.down {
+        SubsystemStanding::Stranded
+    } else if seen.failed || seen.late && !seen.up {
         SubsystemStanding::Failed
     } else if seen.up {
         SubsystemStanding::Up
     } else if seen.down {
         SubsystemStanding::Down
-    } else if seen.stranded {
-        SubsystemStanding::Stranded
     } else {
         return None;
     };
@@ -138,6 +138,10 @@ mod tests {
             Some(SubsystemStanding::Up),
             "late, but there"
         );
-        assert_eq!(standing(up, SeenStanding { stranded: true, ..seen }), Some(SubsystemStanding::Stranded));
+        let stranded = Some(SubsystemStanding::Stranded);
+        assert_eq!(standing(up, SeenStanding { stranded: true, ..seen }), stranded);
+        let failed = Some(SubsystemStanding::Failed);
+        assert_eq!(standing(failed, SeenStanding { stranded: true, failed: true, ..seen }), stranded);
+        assert_eq!(standing(stranded, SeenStanding { stranded: true, failed: true, ..seen }), None);
     }
 }

@@ -55,7 +55,7 @@ impl CoordinatorPart {
                 is_down: false,
                 untold: false,
                 begins: false,
-                ends: None,
+                led: None,
             };
             let thread = if several { format!("coordinator {name}") } else { "coordinator".to_owned() };
             let sees_all = functions.is_some();

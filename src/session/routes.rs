@@ -24,8 +24,7 @@ pub(super) const NO_MORE: &str = "the deployment is being stopped, and does not 
 /// Coordinators, mostly few: giving them an event asks for no memory.
 pub(super) type Handles = SmallVec<[CoordinatorHandle; 8]>;
 
-/// What the coordinators' and the configurator's threads need of each other: filled once both exist. Weak, so that
-/// neither keeps the other alive.
+/// What the coordinators' and the configurator's threads need of each other: filled once both exist. Weak, so that neither keeps the other alive.
 #[derive(Default)]
 pub(super) struct Junction {
     /// With the names under which they ask.
@@ -107,8 +106,7 @@ impl Junction {
         self.ends.is_some_and(|(begins, _)| event == begins)
     }
 
-    /// An event came: from the one that ends the deployment on it is led down, until it is down, or a coordinator takes a
-    /// transition on the one that begins it ([`Listener::moved`]).
+    /// An event came: from the one that ends the deployment on it is led down, until it is down, or a transition is taken on the one that begins it.
     pub fn tell_leaving(&self, configurator: &ConfiguratorHandle, event: EventName) {
         if self.ends.is_some_and(|(_, ends)| event == ends) {
             configurator.leaving(true);
@@ -159,8 +157,8 @@ pub(super) struct ToConfigurator {
     pub untold: bool,
     /// The event that begins the deployment was delivered, and nothing has moved since.
     pub begins: bool,
-    /// The event that ends the subsystem of that path was.
-    pub ends: Option<Ident>,
+    /// The one that begins the subsystem of that path, or ends it, was.
+    pub led: Option<(Ident, bool)>,
 }
 
 impl Listener for ToConfigurator {
@@ -219,10 +217,9 @@ impl Listener for ToConfigurator {
     fn delivers(&mut self, event: EventName) {
         let Some(junction) = self.junction.upgrade() else { return };
         self.begins = junction.begins(event);
-        let led = junction.subsystems().and_then(|subsystems| subsystems.takes_up(self.name, event));
-        self.ends = led.and_then(|(path, ends)| ends.then_some(path));
+        self.led = junction.subsystems().and_then(|subsystems| subsystems.takes_up(self.name, event));
         if let Some(configurator) = self.configurator() {
-            if let Some((path, ends)) = led {
+            if let Some((path, ends)) = self.led {
                 configurator.leaving_inside(path, ends);
             }
             // It may wait behind the one that begins it.
@@ -237,9 +234,7 @@ impl Listener for ToConfigurator {
         {
             configurator.leaving(false);
         }
-        if let Some(path) = self.ends.take() {
-            self.of_subsystems(|subsystems, _| subsystems.ends(path));
-        }
+        self.tell_led(true);
         let is_down = self.down.is_some_and(|down| active.contains(&down));
         self.untold = is_down && !self.is_down;
         self.is_down = is_down;
@@ -249,7 +244,8 @@ impl Listener for ToConfigurator {
     }
 
     fn unmatched(&mut self, _: EventName) {
-        (self.begins, self.ends) = (false, None);
+        self.begins = false;
+        self.tell_led(false);
     }
 
     fn taken_up(&mut self, ticket: u64, delivered: Delivered) {
@@ -285,6 +281,12 @@ impl Listener for ToConfigurator {
 impl ToConfigurator {
     fn configurator(&self) -> Option<ConfiguratorHandle> {
         self.junction.upgrade().and_then(|j| lock(&j.configurator).clone())
+    }
+
+    /// A transition has taken the event that begins or ends its subsystem, or none has.
+    fn tell_led(&mut self, heeded: bool) {
+        let Some((path, ends)) = self.led.take() else { return };
+        self.of_subsystems(|subsystems, _| subsystems.led(path, ends, heeded));
     }
 
     /// Has those know who know how subsystems stand, if there are any.

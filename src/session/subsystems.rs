@@ -223,32 +223,41 @@ impl Subsystems {
     /// A coordinator takes an event up: it may be the one that begins or ends its subsystem. Answers which, and whether it ends it.
     pub fn takes_up(&self, by: Requester, event: EventName) -> Option<(Ident, bool)> {
         let path = self.of.get(&by)?;
-        let at = self.all.iter().position(|known| known.path == *path)?;
-        let known = &self.all[at];
-        let now = self.clock.now();
+        let known = self.all.iter().find(|known| known.path == *path)?;
+        (event == known.begins || event == known.ends).then_some((*path, event == known.ends))
+    }
+
+    /// It was that event, and a transition has taken it or none has: from then on its time counts. Begun anew it is told anew how the subsystem
+    /// stands; where nobody had begun it, who ends it is told all the same when it is down. What nothing takes begins nothing, and ends nothing that
+    /// is down.
+    pub fn led(&self, path: Ident, ends: bool, heeded: bool) {
+        let Some(at) = self.all.iter().position(|known| known.path == path) else { return };
+        let (known, now) = (&self.all[at], self.clock.now());
         let mut lives = lock(&self.lives);
-        if event == known.begins {
-            (lives[at].up_until, lives[at].down_until) = (Some(now + known.up_within), None);
-            lives[at].told.take_if(|told| *told == SubsystemStanding::Down);
-        } else if event == known.ends {
-            (lives[at].down_until, lives[at].up_until) = (Some(now + known.down_within), None);
-        } else {
-            return None;
+        let life = &mut lives[at];
+        let is_down = life.told == Some(SubsystemStanding::Down);
+        match ends {
+            false if heeded => {
+                (life.up_until, life.down_until, life.told) = (Some(now + known.up_within), None, None);
+            }
+            true if heeded || !is_down => {
+                (life.down_until, life.up_until) = (Some(now + known.down_within), None);
+                life.told.take_if(|_| is_down);
+            }
+            _ => return,
         }
         drop(lives);
         self.wake.notify();
-        Some((*path, event == known.ends))
     }
 
-    /// A transition has taken the event that ends a subsystem: where nobody had begun that, it is told all the same when it is down.
-    pub fn ends(&self, path: Ident) {
-        if let Some(at) = self.all.iter().position(|known| known.path == path) {
-            lock(&self.lives)[at].told.take_if(|told| *told == SubsystemStanding::Down);
-        }
-    }
-
-    /// All coordinators of a subsystem are down, and nothing is left of it.
+    /// All coordinators of a subsystem are down, and nothing is left of it. One of them may have asked for something meanwhile: then it is
+    /// told again when that is over.
     pub fn emptied(&self, path: Ident, hub: &Hub, junction: &Junction) {
+        let inside = |of: &Ident| *of == path || of.local(path).is_some();
+        let mut own = self.of.iter().filter(|(_, of)| inside(of));
+        if !own.all(|(by, _)| hub.has_answered(&by.to_string())) {
+            return;
+        }
         if let Some(at) = self.all.iter().position(|known| known.path == path) {
             lock(&self.lives)[at].empty = true;
             self.look_at(at, hub, junction);
@@ -295,7 +304,8 @@ impl Subsystems {
             }
             match told {
                 Some(SubsystemStanding::Up) => life.up_until = None,
-                Some(SubsystemStanding::Down) => life.down_until = None,
+                // What is down is late no more.
+                Some(SubsystemStanding::Down) => (life.down_until, life.up_until) = (None, None),
                 _ => {}
             }
             told

@@ -62,6 +62,8 @@ pub struct Claims {
     numbers: FxHashMap<ComponentName, usize>,
     /// Components that may hold what others may hold, with these.
     contenders: BTreeMap<ComponentName, Vec<ComponentName>>,
+    /// The groups of those that have one.
+    groups: FxHashMap<ConfigId, Ident>,
 }
 
 impl Claims {
@@ -117,6 +119,7 @@ impl Claims {
             claimed.flat_map(|(_, rivals)| rivals).for_each(|at| more.set(*at));
             claim.join(&more);
         }
+        let grouped = configurations.clone();
         let mut groups: BTreeMap<Ident, Claim> = BTreeMap::new();
         for configuration in configurations.clone() {
             if let (Some(group), Some(claim)) = (configuration.group, of.get(&configuration.id)) {
@@ -128,7 +131,13 @@ impl Claims {
                 claim.join(&groups[&group]);
             }
         }
-        Self { of, numbers, contenders }
+        let groups = grouped.filter_map(|configuration| Some((configuration.id, configuration.group?))).collect();
+        Self { of, numbers, contenders, groups }
+    }
+
+    /// Whether applying one takes the frame of another one away: it is that, or of its group, and has one.
+    pub fn replaces(&self, one: ConfigId, other: ConfigId) -> bool {
+        self.groups.get(&one).is_some_and(|group| self.groups.get(&other) == Some(group))
     }
 
     /// Adds one that names components only, and belongs to no group; in the place of one of that name. What a value that it gives

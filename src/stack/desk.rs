@@ -140,6 +140,15 @@ impl Desk {
         }
         for safe in &arrival.safe {
             let Ask::Apply(id) = safe.ask else { continue };
+            // What it takes the place of is not in force any more when that is to be undone: what comes now stays.
+            let replaced = |request: &Request| {
+                let own = request.requester == safe.requester && request.why == Why::Asked;
+                own && matches!(request.ask, Ask::UndoOf(other) if claims.replaces(id, other))
+            };
+            for undo in kept.requests.iter().filter(|request| replaced(request)) {
+                arrival.told.push((*undo, Verdict::Undone, Reason::SafeCame(id)));
+            }
+            kept.requests.retain(|request| !replaced(request));
             // What is behind in a batch under way was asked for before as well.
             let behind = self.under_way.iter_mut().flat_map(|active| &mut active.batch.requests);
             kept.requests.iter_mut().chain(behind.filter(|r| concerns(id, r))).for_each(|request| request.still = true);

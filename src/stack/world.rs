@@ -1,5 +1,6 @@
 //! System, stack and what is broken, as one: all that requests are judged by and that they change.
 
+use super::claims::Claims;
 use super::{FrameId, Request, Requester, Residual, Stack};
 use crate::model::{Ask, ComponentName, ConfigId, Ident, Snapshot};
 use crate::plan::footprint::{Saved, Slot};
@@ -105,10 +106,11 @@ impl World {
 
     /// A safe configuration comes that a state brings with it. Undos by leaving that state that came before (`undos`, oldest
     /// first) are about earlier visits: those whose frame is gone already undo nothing, and not what comes now. `coming`: safe
-    /// configurations that came before, and whose frames are not there yet.
+    /// configurations that came before, and whose frames are not there yet. One of a group takes the place of all of these.
     pub fn note_gone<'r>(
         &self,
         safe: &Request,
+        claims: &Claims,
         coming: impl Iterator<Item = &'r Request>,
         undos: impl Iterator<Item = &'r mut Request>,
     ) {
@@ -120,7 +122,10 @@ impl World {
             self.stack.frames().iter().filter(|frame| {
                 (frame.scope, frame.configuration, frame.requester) == (safe.scope, id, safe.requester)
             });
-        let there = visits.count() + coming.filter(|request| same(Ask::Apply(id), request)).count();
+        let there = match claims.replaces(id, id) {
+            true => 0,
+            false => visits.count() + coming.filter(|request| same(Ask::Apply(id), request)).count(),
+        };
         let undos = undos.filter(|undo| same(Ask::UndoOf(id), undo) && !undo.gone);
         undos.skip(there).for_each(|undo| undo.gone = true);
     }
