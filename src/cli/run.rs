@@ -62,6 +62,19 @@ pub struct Args {
     /// Print every event of the story as one JSON object a line.
     #[arg(long)]
     json: bool,
+    /// End when stdin does: whoever has started it is gone.
+    #[arg(long, hide = true)]
+    with_parent: bool,
+}
+
+/// Stops the script when stdin ends. The thread ends with the process.
+fn end_with_stdin(interrupt: &Interrupt) -> std::io::Result<()> {
+    let interrupt = interrupt.clone();
+    let watches = move || {
+        let _ = std::io::copy(&mut std::io::stdin(), &mut std::io::sink());
+        interrupt.stop(false);
+    };
+    std::thread::Builder::new().name("davit-parent".to_owned()).spawn(watches).map(drop)
 }
 
 impl Run for Args {
@@ -79,6 +92,9 @@ impl Run for Args {
         };
         let interrupt = Interrupt::default();
         let leaving = Leaving::default();
+        if self.with_parent {
+            end_with_stdin(&interrupt).map_err(super::deploy::short)?;
+        }
         let watch = {
             let (stopped, left) = (progress.clone(), progress.clone());
             let (stops, leaving) = (interrupt.clone(), leaving.clone());

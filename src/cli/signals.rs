@@ -42,12 +42,14 @@ impl SignalSeen {
     /// has; what follows the first within [`limits::SIGNAL_REPEATS`] is the same; and only after a pause of
     /// [`limits::SIGNAL_HELD`] one asks for the end at once.
     ///
-    /// `held`: stopping stands still until somebody asks for force. Then one more asks for that, and for no end at once.
+    /// `held`: stopping stands still until somebody asks for force. Then one more asks for that, and for no end at once; the first one
+    /// too, where something else had asked for the end.
     fn asks(&mut self, signal: i32, now: Time, held: bool) -> Asks {
+        let gone = matches!(signal, SIGHUP | SIGXCPU);
         let within = |of: Option<Time>, limit| of.is_some_and(|of| now.since(of) < limit);
         let same = match self.count {
             0 => false,
-            _ if matches!(signal, SIGHUP | SIGXCPU) => true,
+            _ if gone => true,
             1 => within(self.counted, limits::SIGNAL_REPEATS),
             _ => within(self.last, limits::SIGNAL_HELD),
         };
@@ -56,7 +58,7 @@ impl SignalSeen {
             return Asks::Nothing;
         }
         self.counted = Some(now);
-        self.count = (self.count + 1).min(if held { 2 } else { 3 });
+        self.count = if held && !gone { 2 } else { (self.count + 1).min(3) };
         match self.count {
             1 => Asks::Stop,
             2 => Asks::Force,

@@ -109,7 +109,9 @@ impl Args {
     /// What is run of each point, but for its parameters.
     fn command(&self) -> Vec<String> {
         let mut command: Vec<String> =
-            ["--color", "never", "run", "--clock", "simulated", "--quiet", "--json"].map(str::to_owned).to_vec();
+            ["--color", "never", "run", "--with-parent", "--clock", "simulated", "--quiet", "--json"]
+                .map(str::to_owned)
+                .to_vec();
         if let Some(platform) = &self.platform {
             command.extend(["--platform".to_owned(), platform.clone()]);
         }

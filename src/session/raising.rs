@@ -159,6 +159,9 @@ impl Session {
             self.hub()
                 .note(Happening::Forced { note: format!("`{event}` was not delivered: the coordinator is gone") });
         }
+        // One that has acted by itself is heard by nobody: what they kept of it would act once more when force is asked for.
+        let inside = if acted.is_some() { Vec::new() } else { inside };
+        (0..if acted.is_some() { given_on } else { 0 }).for_each(|_| self.hub().taken_up(ticket, None));
         for (event, coordinators) in inside {
             let incoming = self.junction().incoming(Class::Outside, event).watched(ticket);
             self.junction().give(self.hub(), coordinators, incoming);

@@ -467,9 +467,8 @@ pub(super) fn on_platform(hub: &Hub, junction: &Junction, event: &PlatformEvent)
     if let Some(configurator) = &configurator {
         junction.tell_leaving(configurator, event);
     }
-    let acted = acts();
-    junction.give_all(hub, Class::Report, event);
-    if acted.is_none() {
+    if acts().is_none() {
+        junction.give_all(hub, Class::Report, event);
         // Nobody leads any more since just now.
         acts();
     }

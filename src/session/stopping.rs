@@ -394,9 +394,21 @@ impl Session {
         };
         let hears = |event: EventName| self.who_hears(event, &[]).any(lets_go);
         let safety = self.deployment().safety.iter().map(|(event, _)| *event).find(|event| hears(*event));
+        // What ends a subsystem comes from those around it.
+        let of = |name: Ident| self.parts().iter().find(|part| part.name == name).and_then(|part| part.of);
+        let inside = match frame.by {
+            Requester::Coordinator(name) => Ident::new(name.as_str()).ok().and_then(of),
+            Requester::Operator | Requester::Safety => None,
+        };
+        let around =
+            |outer: &Ident| inside.is_some_and(|inside| of(*outer).is_none_or(|of| inside.local(of).is_some()));
+        let outer = self.who_hears(shutdown, &[]).find(around);
         let leads_on = match (hears(shutdown), safety) {
             (true, _) => {
                 format!("`davit shutdown` raises `{shutdown}` once more, which its coordinator hears there; {force}")
+            }
+            (false, _) if let Some(outer) = outer => {
+                format!("`davit shutdown` raises `{shutdown}` once more, which `{outer}` hears there; {force}")
             }
             (false, Some(event)) => format!("its coordinator hears `davit event {event}` there; {force}"),
             (false, None) => format!("its coordinator hears nothing there that is open now; {force}"),

@@ -1,6 +1,7 @@
 //! `davit sweep`: a grid of runs, of which none takes another one with it.
 
 use crate::demo::{Demo, Ran};
+use std::process::Stdio;
 
 const ROOT: &str = env!("CARGO_MANIFEST_DIR");
 
@@ -82,4 +83,16 @@ fn what_is_not_read_or_not_written_so_is_named() {
     assert_eq!((ran.code, ran.out.as_str()), (0, "ran\n"), "{}", ran.err);
     let ran = demo.run(&["run", "late.lua", "--clock", "simulated", "--quiet", "--set", "k=2", "--set", "late=3"]);
     assert!(ran.code == 2 && ran.err.contains("nothing reads the parameter `late`"), "{}{}", ran.out, ran.err);
+}
+
+#[test]
+fn a_run_ends_with_whoever_has_started_it() {
+    let demo = Demo::new();
+    demo.write("story.lua", "for i = 1, 1000000000 do wait(0.001) end");
+    let mut command = demo.command(&["run", "story.lua", "--clock", "simulated", "--with-parent"]);
+    let mut child = command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    assert!(child.try_wait().unwrap().is_none());
+    // As the system does for one that was killed; `wait` does it as well.
+    drop(child.stdin.take());
+    assert_eq!(child.wait().unwrap().code(), Some(1), "it was interrupted");
 }

@@ -7,6 +7,7 @@ mod classes;
 mod defects;
 mod doors;
 mod flood;
+mod given_on;
 mod hangs;
 mod life;
 #[path = "../support/names.rs"]

@@ -95,23 +95,34 @@ impl Small {
 
     /// The same with something between it and its platform.
     pub fn on(leading: &str, faults: Vec<FaultRule>, wrap: impl FnOnce(Simulated) -> Arc<dyn Platform>) -> Self {
+        Self::of(leading, &[], "d.yaml", faults, wrap)
+    }
+
+    /// The same of a file beside these, in which it may be a subsystem.
+    pub fn of(
+        leading: &str,
+        more: &[(&str, &str)],
+        main: &str,
+        faults: Vec<FaultRule>,
+        wrap: impl FnOnce(Simulated) -> Arc<dyn Platform>,
+    ) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let coordinator = coordinator(leading);
-        for (name, text) in
-            [("d.yaml", DEPLOYMENT), ("conf.lua", CONFIGURATIONS), ("coordinator.lua", coordinator.as_str())]
-        {
+        let own = [("d.yaml", DEPLOYMENT), ("conf.lua", CONFIGURATIONS), ("coordinator.lua", coordinator.as_str())];
+        for (name, text) in own.iter().chain(more) {
             std::fs::write(folder.path().join(name), text).unwrap();
         }
         // It is about a coordinator that does not do what `check` demands.
-        let read = app::read(&folder.path().join("d.yaml"), &LoadOptions::default(), libraries::builtin());
+        let read = app::read(&folder.path().join(main), &LoadOptions::default(), libraries::builtin());
         let checked = read
             .and_then(|read| app::check_while(read, true, &|_| Ok(())))
             .unwrap_or_else(|refused| panic!("{:#?}", refused.findings));
         let clock = Clock::simulated();
         let guard = clock.enter();
         let two = |step: &str| (StepPattern::new(step), Duration::from_secs(2));
-        let delays =
-            Delays { of: vec![two("operation_call a.raise"), two("operation_call a.lower")], ..Delays::default() };
+        let inside = ["operation_call in/a.raise", "operation_call in/a.lower"];
+        let of = ["operation_call a.raise", "operation_call a.lower"].into_iter().chain(inside).map(two).collect();
+        let delays = Delays { of, ..Delays::default() };
         let options =
             SimulatedOptions { faults: Faults::new(faults), delays, blocking: true, ..SimulatedOptions::default() };
         let platform = Simulated::new(checked.catalogue.clone(), clock.clone(), options);

@@ -20,6 +20,13 @@ fn where_force_is_waited_for_a_signal_asks_for_it() {
     assert_eq!(asks(7000, false), Asks::Leave);
 }
 
+/// The same where `davit shutdown` has asked for the end, and no signal has come yet; but a terminal that is gone forces nothing.
+#[test]
+fn where_force_is_waited_for_the_first_signal_asks_for_it() {
+    let asks = |signal| SignalSeen::default().asks(signal, Time(0), true);
+    assert_eq!([asks(SIGINT), asks(SIGTERM), asks(SIGHUP)], [Asks::Force, Asks::Force, Asks::Stop]);
+}
+
 #[test]
 fn one_cause_is_one_signal() {
     use Asks::{Force, Leave, Nothing, Stop};

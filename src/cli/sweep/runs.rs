@@ -103,11 +103,13 @@ impl Sweeping {
             Err(error) => return failed(format!("this program does not find itself: {error}")),
         };
         let mut command = Command::new(program);
-        command.args(&self.command).args(more).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::null());
+        command.args(&self.command).args(more).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::null());
         let mut child = match command.spawn() {
             Ok(child) => child,
             Err(error) => return failed(format!("it could not be started: {error}")),
         };
+        // It ends with this process, however that ends.
+        let _parent = child.stdin.take();
         let clock = Clock::real();
         let (told, heard) = clock.channel(1);
         let stdout = child.stdout.take();

@@ -3,7 +3,7 @@
 use super::reading::{AS_IT_IS, a_file};
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write};
-use std::os::unix::fs::OpenOptionsExt;
+use std::os::unix::fs::{FileExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 
 /// Where the older one is.
@@ -27,6 +27,7 @@ impl Rotating {
     /// Opens it behind what is there already.
     pub fn open(path: PathBuf, bound: u64) -> io::Result<Self> {
         let file = OpenOptions::new()
+            .read(true)
             .append(true)
             .create(true)
             .mode(0o600)
@@ -35,7 +36,9 @@ impl Rotating {
             .and_then(a_file)?;
         let size = file.metadata()?.len();
         // Whoever wrote before may have been killed in the middle.
-        Ok(Self { path, file, size, bound, torn: size > 0 })
+        let mut last = [0];
+        let whole = size == 0 || file.read_exact_at(&mut last, size - 1).is_ok() && last == *b"\n";
+        Ok(Self { path, file, size, bound, torn: !whole })
     }
 
     /// Adds a line. Where a new file begins with it, `head` stands before it.
