@@ -45,6 +45,9 @@ macro_rules! codes {
 
 codes! {
     // ---- text and files (lang) -------------------------------------------------------------------------------------
+    TEXT_NO_DEPLOYMENT = "text::no_deployment", "a file is no deployment",
+        "A deployment is a file in YAML with `davit: 1`; it names the files of its coordinator, its configurations and its monitors. The file given \
+         is one of those. Give the deployment instead.";
     TEXT_NO_FILE = "text::no_file", "there is no such file",
         "A file that was asked for, or that a deployment names, does not exist. Files named in a deployment are looked \
          for from the folder of the deployment file. Correct the path; near names in that folder are suggested.";

@@ -9,6 +9,7 @@ use crate::time::clock::panic_text;
 use serde::{Deserialize, Serialize};
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::time::Duration;
 
 /// How a deployment ended.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -73,7 +74,7 @@ impl Session {
                 None
             }
         };
-        let (mut force, mut unanswered) = (false, false);
+        let (mut force, mut unanswered, mut told) = (false, false, false);
         let why = loop {
             if let Some(Command::Shutdown { force: by_force }) = self.pending_command() {
                 force = by_force;
@@ -103,7 +104,12 @@ impl Session {
             let now = self.clock().now();
             if now >= deadline {
                 match self.waits_for_people(start) {
-                    Ok(true) => deadline = now + bring_up.within,
+                    Ok(true) => {
+                        deadline = now + bring_up.within;
+                        if !std::mem::replace(&mut told, true) {
+                            self.tell_held(now.since(start));
+                        }
+                    }
                     // It may be one: asked once more, before anything moves.
                     Err(Unanswered) if !std::mem::replace(&mut unanswered, true) => deadline = now + bring_up.within,
                     _ => {}
@@ -132,6 +138,16 @@ impl Session {
         let reasons = self.failures_since(began);
         let ended = self.stop(force, true);
         Err(NotUp { why: why.0, reasons, interrupted: why.1, ended })
+    }
+
+    /// It does not come up since something safe came, and nothing is stopped before people ask for it.
+    fn tell_held(&self, took: Duration) {
+        let note = format!(
+            "not up after {} s, and a safe configuration is in force: an event that its coordinator hears leads on (`davit status` says where it is), \
+             `davit shutdown` leads it down",
+            took.as_secs_f64().round()
+        );
+        self.hub().note(Happening::Forced { note });
     }
 
     /// Waits until somebody commands the end. A deployment that breaks meanwhile stays: its coordinator decides. One whose

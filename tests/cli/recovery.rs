@@ -142,7 +142,8 @@ fn the_undo_of_what_broke_it_recovers_as_well() {
     let deployed = Deployed::broken();
     let undo = deployed.0.run(&["undo", "swap", "--wait"]);
     assert_eq!(undo.code, 0, "{}{}", undo.out, undo.err);
-    assert_eq!(deployed.status()["phase"], "up");
+    // Whoever drives it looks again once that is answered.
+    deployed.0.until_phase("up");
 }
 
 #[test]

@@ -102,7 +102,8 @@ fn in_simulated_time_a_slow_reader_misses_nothing() {
     command.stdout(Stdio::from(program));
     let ran = Foreground::start(&mut command);
     drop(command);
-    let said = read_until(&mut person, &format!("\"{lines}\""));
+    // To the end of that line.
+    let said = read_until(&mut person, &format!("\"text\":\"{lines}\",\"what\":\"said\"}}"));
     let texts: Vec<usize> = said
         .lines()
         .filter_map(|line| serde_json::from_str::<serde_json::Value>(line).ok()?["text"].as_str()?.parse().ok())

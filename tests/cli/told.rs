@@ -136,6 +136,17 @@ fn a_deployment_is_no_script_and_a_parameter_that_nothing_reads_is_a_mistake_of_
 }
 
 #[test]
+fn a_part_of_a_deployment_is_no_deployment() {
+    let demo = Demo::new();
+    demo.write("only.yaml", "coordinator:\n  states: { idle: {} }\n");
+    let ran = demo.run(&["check", "only.yaml"]);
+    let told =
+        ran.err.contains("this is a file of a coordinator, and no deployment") && !ran.err.contains("missing_key");
+    assert!(ran.code == 1 && told, "{}", ran.err);
+    assert_eq!(demo.run(&["graph", "only.yaml"]).code, 0);
+}
+
+#[test]
 fn what_is_planned_alone_says_what_has_to_come_before() {
     let demo = Demo::new();
     let ran = demo.run(&["plan", "deployment.yaml", "fast"]);

@@ -419,6 +419,11 @@ fn an_emergency_on_the_way_up_stops_the_time() {
     let not_up = small.session.bring_up().unwrap_err();
     let took = small.clock.now().since(began).as_secs_f64();
     assert!(took >= 60.0 && not_up.interrupted, "{took}: {not_up:?}");
+    let log = small.session.hub().log(usize::MAX);
+    let told = log.iter().filter(
+        |entry| matches!(&entry.what, Happening::Forced { note } if note.starts_with("not up after 20 s, and a safe")),
+    );
+    assert_eq!(told.count(), 1, "who waits for it to come up is told why it does not");
     let calls = small.steps().iter().filter(|step| step.contains("a.raise")).count();
     assert_eq!(calls, 1, "nothing moves after it: {:?}", small.heard.lock().unwrap());
 }

@@ -100,8 +100,27 @@ fn note_orders(ty: &Entry, out: &mut BTreeMap<String, Origin>) {
     }
 }
 
+/// What a file is of that a deployment names, by its only key, and in which it is not named but written.
+fn is_a_part(node: &Node) -> Option<&'static str> {
+    let Kind::Map(entries) = &node.kind else { return None };
+    let [only] = &entries[..] else { return None };
+    let written = matches!(only.value.kind, Kind::Map(_));
+    match &*only.key {
+        "coordinator" if written => Some("a coordinator"),
+        "configurations" if written => Some("configurations"),
+        "monitors" if written => Some("monitors"),
+        _ => None,
+    }
+}
+
 /// Lowers the tree of a deployment file.
 pub fn draft(cx: &mut Cx, node: Node, file_name: &str) -> Option<Draft> {
+    if let Some(part) = is_a_part(&node) {
+        let message = format!("this is a file of {part}, and no deployment");
+        let help = "give the deployment that names it (it has `davit: 1`); `davit sim`, `davit graph` and `davit convert` take a coordinator";
+        cx.report(Finding::error(codes::TEXT_NO_DEPLOYMENT, message).at(node.origin).help(help));
+        return None;
+    }
     let mut key_origins = BTreeMap::new();
     if let Kind::Map(entries) = &node.kind {
         note_keys(entries, "", &mut key_origins);
