@@ -480,5 +480,8 @@ pub const OFFERED: usize = 1024;
 /// (`check/children.rs` keeps that in one word of a state), and what is not followed must not be called sound.
 pub const SUBSYSTEMS: usize = 20;
 
+/// Coordinators of one deployment, its subsystems' among them: `check` keeps a bit of each in one word of a state.
+pub const COORDINATORS: usize = 60;
+
 /// Subsystems in each other: a cell with robots with arms with grippers is four.
 pub const SUBSYSTEM_DEPTH: usize = 8;

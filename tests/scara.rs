@@ -123,13 +123,17 @@ impl LogSink for Heard {
 }
 
 fn story(set: &[(&str, &str)]) -> (ScriptEnd, String) {
+    run(&root().join("examples/scara/story.lua"), set)
+}
+
+fn run(script: &Path, set: &[(&str, &str)]) -> (ScriptEnd, String) {
     let said = Arc::new(Mutex::new(String::new()));
     let heard = said.clone();
     let mut load = LoadOptions::default();
     load.set.extend(set.iter().map(|(name, value)| ((*name).to_owned(), (*value).to_owned())));
     let clock = Clock::simulated();
     let end = script::run(
-        &root().join("examples/scara/story.lua"),
+        script,
         ScriptOptions {
             clock: clock.clone(),
             extensions: libraries().into(),
@@ -162,6 +166,30 @@ fn the_story_keeps_its_bounds_and_is_the_same_each_time() {
     let (other, _) = story(&[("seconds", "7"), ("seed", "3")]);
     assert!(other.failure.is_none(), "{:?}\n{:#?}", other.failure, other.figures);
     assert_ne!(format!("{:?}", first.figures), format!("{:?}", other.figures));
+}
+
+/// Drives that die, or were held up for longer than their watchdog waits, stop the robot, as the youBot's do: it does not go on by itself.
+#[test]
+fn drives_that_die_or_are_late_are_noticed() {
+    let folder = tempfile::tempdir().unwrap();
+    let told = |what: &str| {
+        let file = root().join("examples/scara/deployment.yaml");
+        let script = folder.path().join("dies.lua");
+        let text = format!(
+            "deploy([[{}]]) wait_state('copying', 15) wait(0.5) {what} say('it is in ' .. table.concat(active(), ' '))",
+            file.display()
+        );
+        std::fs::write(&script, text).unwrap();
+        let (end, said) = run(&script, &[]);
+        format!("{said}{:?}", end.failure)
+    };
+    let dead = told("inject('Drives', 'panic') wait(0.06)");
+    assert!(dead.contains("it is in root root.fault"), "{dead}");
+    let unfolding = "raise('e_shutdown') wait_state('idle', 20) raise('e_start') wait_state('unfolding', 3) wait(1)";
+    let dead = told(&format!("{unfolding} inject('Drives', 'panic') wait(0.06) say('Drives: ' .. state('Drives'))"));
+    assert!(dead.contains("it is in root root.halted") && dead.contains("Drives: faulted"), "{dead}");
+    let late = told("inject('Drives', 'stall', { seconds = 0.1 }) wait(2)");
+    assert!(late.contains("it is in root root.fault") && late.contains("e_EC_TIMEOUT"), "{late}");
 }
 
 // ---- the control loop ---------------------------------------------------------------------------------------------------

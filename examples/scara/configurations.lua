@@ -51,7 +51,8 @@ ConfiguratorConf {
   },
 
   start_driver = Configuration { description = "the drives are there, off: the quill's brake carries it",
-    post_conf_state = { "Plant:running", "Drives:running" },
+    -- What dies from here on is noticed.
+    post_conf_state = { "Plant:running", "Drives:running", "Monitors:running" },
   },
   calibrate = Configuration { timeout = 10.0, operation_call("Drives.home") },
   unfold    = Configuration { timeout = 10.0, operation_call("Drives.unfold"):undo("Drives.fold") },

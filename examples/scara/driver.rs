@@ -27,6 +27,9 @@ const FAULTS: [(&str, &str, &str); 5] = [
 /// The one that an arm which is not heard means.
 const BUS: usize = 3;
 
+/// Why drives that have died do nothing.
+const DIED: &str = "the drives have died: what they do is not known";
+
 const UNACKNOWLEDGED: &str = "a fault was not acknowledged";
 
 struct Names {
@@ -60,6 +63,16 @@ pub struct Driver {
     unwatched: Option<f64>,
 }
 
+/// What has died is asked in vain: what it answered nobody would do.
+fn alive<A>(
+    asked: impl Fn(&mut Driver, &mut Context, A) -> OperationAnswer,
+) -> impl Fn(&mut Driver, &mut Context, A) -> OperationAnswer {
+    move |drives, cx, args| match cx.is_faulted() {
+        true => OperationAnswer::failed(DIED),
+        false => asked(drives, cx, args),
+    }
+}
+
 impl Component for Driver {
     fn new(b: &mut Builder<Self>) -> Self {
         b.describe(
@@ -88,57 +101,63 @@ impl Component for Driver {
         });
         b.doc("Changes what the drives do: 0 off and the brake closed, 1 hold, 2 take torques.").operation(
             "set_mode",
-            |c, _, (mode,): (u8,)| match Mode::from_number(mode) {
+            alive(|c, _, (mode,): (u8,)| match Mode::from_number(mode) {
                 Some(mode) => c.set_mode(mode),
                 None => OperationAnswer::failed(format!("no mode {mode}: 0, 1 or 2")),
-            },
+            }),
         );
         b.doc("The quill to its upper stop, then the carriage to its end. Takes seconds.")
             .no_effect()
             .moves()
-            .operation("home", |c, cx, (): ()| c.begin(cx, Drives::home));
+            .operation("home", alive(|c, cx, (): ()| c.begin(cx, Drives::home)));
         b.doc("To the working pose, and holds there. Takes seconds.")
             .undone_by("fold")
             .moves()
-            .operation("unfold", |c, cx, (): ()| c.begin(cx, Drives::unfold));
+            .operation("unfold", alive(|c, cx, (): ()| c.begin(cx, Drives::unfold)));
         b.doc("Folded, the quill at its top, the carriage at its end. Takes seconds.")
             .undone_by("unfold")
             .moves()
-            .operation("fold", |c, cx, (): ()| c.begin(cx, Drives::fold));
+            .operation("fold", alive(|c, cx, (): ()| c.begin(cx, Drives::fold)));
         b.doc("Whatever moves comes to rest along a ramp and is held there.").undone_by("release").operation(
             "brake",
-            |c, _, (): ()| {
+            alive(|c, _, (): ()| {
                 c.task = None;
                 c.drives.brake();
                 OperationAnswer::Done(())
-            },
+            }),
         );
         b.doc("They take torques again if they did before they braked and nothing is wrong; else they hold on.")
             .undone_by("brake")
-            .operation("release", |c, _, (): ()| {
-                c.drives.release(c.faults == 0);
-                OperationAnswer::Done(())
-            });
+            .operation(
+                "release",
+                alive(|c, _, (): ()| {
+                    c.drives.release(c.faults == 0);
+                    OperationAnswer::Done(())
+                }),
+            );
         b.doc("As brake, and nothing takes it back: for what moves although they were braked before.")
             .no_effect()
-            .operation("stop", |c, _, (): ()| {
-                c.task = None;
-                c.drives.stop();
-                OperationAnswer::Done(())
-            });
+            .operation(
+                "stop",
+                alive(|c, _, (): ()| {
+                    c.task = None;
+                    c.drives.stop();
+                    OperationAnswer::Done(())
+                }),
+            );
         b.doc("They take torques, whatever made them hold. Fails while they were told to brake, or a fault was not acknowledged.").no_effect().operation(
             "resume",
-            |c, _, (): ()| match c.faults {
+            alive(|c, _, (): ()| match c.faults {
                 0 => c.drives.resume().map_or_else(OperationAnswer::failed, OperationAnswer::Done),
                 _ => OperationAnswer::failed(UNACKNOWLEDGED),
-            },
+            }),
         );
         b.doc("What was wrong is over: they take torques again when they are asked to.").no_effect().operation(
             "acknowledge",
-            |c, _, (): ()| {
+            alive(|c, _, (): ()| {
                 c.faults = 0;
                 OperationAnswer::Done(())
-            },
+            }),
         );
         for (i, (name, _, what)) in FAULTS.into_iter().enumerate() {
             b.doc(what).injection(name, move |c, _, (): ()| {
@@ -186,6 +205,11 @@ impl Component for Driver {
         if let Some((seen, _)) = seen {
             self.drives.see(V5::from(seen.pos), V5::from(seen.vel));
         }
+        // Held up for longer than their watchdog waits the drives were off: they hold where the arm is now, with forces that begin from none.
+        if dt > BUS_TIMEOUT && self.drives.mode() != Mode::Off {
+            self.drives.lose_power();
+            self.fail(BUS);
+        }
         let deaf = seen.is_none_or(|(_, age)| age > BUS_TIMEOUT);
         if told(&mut self.unheard, deaf, dt) {
             self.fail(BUS);
@@ -209,7 +233,7 @@ impl Component for Driver {
         if told(&mut self.unwatched, unwatched && self.drives.mode() == Mode::Torques, dt) {
             self.events.raise(self.names.unwatched);
         }
-        match self.drives.update(command, dt) {
+        match self.drives.update(command, going_on(cx)) {
             None => {}
             Some(Ended::Well) => _ = self.task.take().map(|task| task.done(())),
             Some(Ended::Badly) => _ = self.task.take().map(|task| task.failed("the axes did not get there")),
@@ -236,6 +260,12 @@ fn told(since: &mut Option<f64>, so: bool, dt: f64) -> bool {
         *since = Some(0.0);
     }
     tell
+}
+
+/// How far an update takes ramps and motions, in s: one period, however long it was held up before.
+fn going_on(cx: &Context) -> f64 {
+    let period = if cx.period() > 0.0 { cx.period() } else { 0.001 };
+    cx.dt().min(period)
 }
 
 impl Driver {

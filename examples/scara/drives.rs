@@ -172,6 +172,11 @@ impl Drives {
         self.switch(Mode::Holding);
     }
 
+    /// They were off, whatever was asked of them.
+    pub fn lose_power(&mut self) {
+        (self.effort, self.left) = (V5::zeros(), V5::zeros());
+    }
+
     /// As [`hold`](Self::hold), of what moves or takes torques: what holds already goes on with that, what is off stays off.
     pub fn stop(&mut self) {
         if self.busy() || self.mode == Mode::Torques {

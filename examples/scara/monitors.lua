@@ -16,15 +16,21 @@ local degraded = all { settled, no(good) }
 
 local force = "Follower.wanted"
 local heard = no(silent(force, 0.2))
+local torques = equals("Drives.mode", TORQUES)
+-- What commands them is started just before they take torques.
+local commanded = torques:for_at_least(0.01)
+-- Drives that are dead go on showing what they said last. Where that was that they have power nobody knows what they do now.
+local drives_lost = all { differs("Drives.mode", 0), silent("Drives.axes", DEAD) }
 -- Near counts where the drives take torques: an arm that is stopped is not about to couple.
-local near  = all { heard, below(force, 2.0), equals("Drives.mode", TORQUES) }:for_at_least(0.3)
+local near  = all { heard, below(force, 2.0), torques, no(drives_lost) }:for_at_least(0.3)
 
 -- Speeds of the joints, in rad/s, and of the quill and the carriage, in m/s.
 local joints = max { abs("Drives.axes.vel[1]"), abs("Drives.axes.vel[2]") }
 local quill, carriage = abs("Drives.axes.vel[3]"), abs("Drives.axes.vel[0]")
 
 Monitors {
-  link_lost    = monitor { when = no(settled), event = "e_link_lost", repeat_every = AGAIN },
+  -- Where the drives do not take torques nobody couples, and nobody asks for the link.
+  link_lost    = monitor { when = all { torques, no(settled) }, event = "e_link_lost", repeat_every = AGAIN },
   qos_ok       = monitor { when = all { settled, good }, event = "e_qos_ok", repeat_every = AGAIN },
   qos_degraded = monitor { when = degraded, event = "e_qos_degraded", repeat_every = AGAIN },
   qos_restored = monitor { when = all { rise(good), degraded:within_last(0.02) }, event = "e_qos_restored" },
@@ -44,8 +50,10 @@ Monitors {
   -- The drives' own motions are slower than these.
   overspeed      = monitor { when = any { above(joints, 2.0), above(quill, 0.4) }, event = "e_overspeed", repeat_every = AGAIN },
   base_overspeed = monitor { when = above(carriage, 0.6), event = "e_base_overspeed", repeat_every = AGAIN },
-  controller_lost = monitor { description = "the follower, which writes in every update, is not heard",
-    when = silent("Follower.active", DEAD), event = "e_controller_lost", repeat_every = AGAIN },
+  controller_lost = monitor { description = "the follower, which writes in every update, is not heard by drives that take torques",
+    when = all { commanded, no(drives_lost), silent("Follower.active", DEAD) }, event = "e_controller_lost", repeat_every = AGAIN },
+  drives_lost = monitor { description = "the drives, which write in every update, are not heard",
+    when = drives_lost, event = "e_EC_TIMEOUT", repeat_every = AGAIN },
   drives_let_go  = monitor { description = "the drives do not take torques any more",
     when = differs("Drives.mode", TORQUES):for_at_least(0.01), event = "e_drives_let_go", repeat_every = AGAIN },
 }

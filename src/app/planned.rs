@@ -52,8 +52,9 @@ pub fn wrong_in_others(read: &Read, told: &[Finding]) -> Findings {
 /// Planning begins with nothing deployed: what creates what is not there then has to be named, too.
 fn begins_with_nothing(deployment: &Deployment, id: ConfigId, findings: &mut [Finding]) {
     let creates = |c: &&Configuration| c.changes.iter().any(|change| matches!(change.kind, ChangeKind::Create { .. }));
-    let creators =
-        deployment.configurations.iter().filter(creates).map(|c| c.id.as_str()).filter(|c| *c != id.as_str());
+    // A subsystem's components are made by its own file.
+    let creators = deployment.configurations.iter().filter(creates).filter(|c| c.id.prefix() == id.prefix());
+    let creators = creators.map(|c| c.id.as_str()).filter(|c| *c != id.as_str());
     let creators: Vec<&str> = creators.take(3).collect();
     for finding in findings.iter_mut().filter(|f| f.code == UNKNOWN_COMPONENT && !creators.is_empty()) {
         finding.help = Some(format!(

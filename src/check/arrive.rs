@@ -7,7 +7,7 @@ use super::seldom::Interrupted;
 use super::state::{ProductState, States, add, bit, one};
 use crate::limits;
 use crate::model::{Ask, ConfigId, Verdict};
-use crate::stack::{ActiveBatch, Arrived, Batch, Desk, LedDown, Request, Requester, Why, given_up_of};
+use crate::stack::{ActiveBatch, Arrived, Batch, Desk, Request, Requester, Why, given_up_of};
 use crate::statechart::EventId;
 use smallvec::SmallVec;
 use std::rc::Rc;
@@ -148,7 +148,7 @@ impl Product<'_> {
                 behind.filter(|of| !stops.contains(of) && !state.is_stopped(*of)).collect();
             stops.extend(behind.iter().copied());
             let is_safe = |r: &Request| matches!(r.ask, Ask::Apply(id) if self.is_safe(id));
-            // AnsweredPlaces up alone and once, it is answered the same way at whatever time.
+            // Given up alone and once, it is answered the same way at whatever time.
             let among = |active: &ActiveBatch| {
                 let gives_up = |request: &&Request| given_up_of(request, &active.batch.requests).is_some();
                 let twice = batch.requests.iter().filter(gives_up).count() > 1;
@@ -157,7 +157,8 @@ impl Product<'_> {
                 stops.contains(&active.number) && differs
             };
             if batch.requests.iter().any(is_safe) || state.desk.under_way().iter().any(among) {
-                // Any of them, but no more than a few at once.
+                // Any of them, but no more than a few at once: of more not each was followed.
+                self.forked |= stops.len() > 3;
                 for some in 1..1u32 << stops.len().min(3) {
                     // Where others wait, it may have come before or after them.
                     for last in [false, true]
@@ -331,10 +332,10 @@ impl Product<'_> {
         let asked = seldom.get().safe.iter().map(|request| request.ask);
         let safe: SmallVec<[ConfigId; 1]> =
             asked.filter_map(|ask| if let Ask::Apply(id) = ask { Some(id) } else { None }).collect();
-        let alone = |batch: &Batch| (*leaving && self.worlds.goes_alone(*world, batch)).then_some(LedDown::Whole);
-        if desk.waiting().any(|batch| alone(batch).is_some()) {
+        let along = |batch: &Batch| if *leaving { self.worlds.taken_along(*world, batch) } else { None };
+        if desk.waiting().any(|batch| along(batch).is_some()) {
             let begin =
-                |desk: &mut Desk| desk.begin_next(&self.worlds.claims, alone, &safe).map(|active| active.number);
+                |desk: &mut Desk| desk.begin_next(&self.worlds.claims, along, &safe).map(|active| active.number);
             return self.desks.change(desk, begin);
         }
         self.desks.begin_next(desk, safe, &self.worlds.claims)

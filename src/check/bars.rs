@@ -18,6 +18,7 @@ impl Graph<'_, '_> {
     pub(super) fn bars(&mut self) -> Vec<Option<Barred>> {
         let people = self.stands_still();
         let shutdown = self.product.deployment.shutdown.event;
+        let unknown = self.product.children.iter().any(|child| child.beliefs.is_none());
         let mut bars: Vec<Option<Barred>> = Vec::with_capacity(self.edges.len());
         let mut watched: FxHashMap<(u16, u32), bool> = FxHashMap::default();
         let mut asked: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
@@ -35,6 +36,10 @@ impl Graph<'_, '_> {
                     let comes = *watched.entry((at, world)).or_insert_with(watches);
                     asked.entry(usize::from(at)).or_default().push(number);
                     (!comes).then_some(Barred::Gone)
+                }
+                (None, Move::Event(at)) if unknown => {
+                    let unended = |name| self.product.unended(&self.states[edge.from as usize], name).is_some();
+                    self.product.alike_to(at).all(unended).then_some(Barred::Gone)
                 }
                 (barred, _) => barred,
             });
@@ -59,7 +64,9 @@ impl Graph<'_, '_> {
         let begins = |edge: &&Edge| !self.states[edge.from as usize].stopping && safe(edge.to);
         let open: Vec<u32> = self.edges.iter().filter(begins).map(|edge| edge.to).collect();
         let best = |edge: &Edge| self.failed[edge.from as usize].max(edge.failed()) <= self.failed[edge.to as usize];
-        let before = self.spread_from(open, |_, edge| safe(edge.to) && best(edge));
+        // Where one is there that was asked for meanwhile, that holds it now; of a group it is the only one.
+        let comes = |edge: &Edge| self.states[edge.from as usize].safe.len() > self.states[edge.to as usize].safe.len();
+        let before = self.spread_from(open, |_, edge| safe(edge.to) && best(edge) && !comes(edge));
         (0u32..).zip(before).map(|(at, before)| safe(at) && !before).collect()
     }
 

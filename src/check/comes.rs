@@ -35,9 +35,9 @@ impl Worlds<'_> {
 
     /// The first requests of a batch, as the stack decides.
     pub fn group(&self, id: WorldId, requests: &[Request], concurrent: &ConcurrentWork) -> Option<Group> {
-        let ConcurrentWork { held, joined, placed, alone } = concurrent;
+        let ConcurrentWork { held, joined, placed, led } = concurrent;
         let pushes = Some(self.pushes.of(self.system(id)));
-        let rules = Rules { held, joined: *joined, placed: *placed, alone: *alone, pushes, ..self.rules() };
+        let rules = Rules { held, joined: *joined, placed: *placed, led: *led, pushes, ..self.rules() };
         self.get(id).map(|world| take_up(world, requests, &rules))
     }
 

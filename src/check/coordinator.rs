@@ -101,8 +101,7 @@ pub fn outside_events(deployment: &Deployment, chart: &Chart) -> Vec<EventName> 
 /// All answers to what the chart asks for, and what it is told about that later.
 pub fn answers(deployment: &Deployment, chart: &Chart) -> BTreeSet<EventName> {
     let asks = chart.raises().iter().filter_map(|site| ask_of(deployment, site.name));
-    let mut answers: BTreeSet<EventName> =
-        asks.flat_map(|ask| ask.verdicts().iter().map(move |verdict| verdict.event(ask))).collect();
+    let mut answers: BTreeSet<EventName> = asks.flat_map(answers_to).collect();
     // Told in whatever state it is, whoever asked.
     let holds = deployment.configurations.iter().filter(|c| c.holds.is_some());
     answers.extend(holds.map(|c| Verdict::Lost.event(Ask::Apply(c.id))));
@@ -124,7 +123,8 @@ fn raised(deployment: &Deployment, chart: &Chart, known: &KnownEvents<'_>, findi
         let is_known = match Raise::of(site.name, |id| ids.contains(&id.as_str())) {
             Raise::Request(_) => true,
             Raise::UnknownUndo => false,
-            Raise::Event => emits.contains(&site.name),
+            // What a state has as its `config` is a configuration, whatever is emitted.
+            Raise::Event => emits.contains(&site.name) && !site.scoped,
         };
         // The undo of a state-scoped configuration was not written by anybody; its entry is reported.
         if is_known || (site.scoped && matches!(site.when, RaiseMoment::Exit(_))) {
@@ -136,7 +136,8 @@ fn raised(deployment: &Deployment, chart: &Chart, known: &KnownEvents<'_>, findi
             continue;
         }
         let (id, undo) = site.name.as_str().strip_suffix(".undo").map_or((site.name.as_str(), ""), |id| (id, ".undo"));
-        let (asked_for, emitted) = (asked_for(&ids, id), emits.iter().map(|e| e.as_str()).filter(|_| undo.is_empty()));
+        let may_be_event = undo.is_empty() && !site.scoped;
+        let (asked_for, emitted) = (asked_for(&ids, id), emits.iter().map(|e| e.as_str()).filter(|_| may_be_event));
         let help = did_you_mean(id, "configurations", asked_for.iter().map(String::as_str).chain(emitted));
         let message = if site.scoped || !undo.is_empty() {
             format!("there is no configuration `{id}`")
@@ -145,7 +146,7 @@ fn raised(deployment: &Deployment, chart: &Chart, known: &KnownEvents<'_>, findi
         };
         // Either of the two may be the slip.
         let unraised = deployment.emits.iter().filter(|(event, _)| !chart.raises().iter().any(|s| s.name == *event));
-        let unraised: Vec<_> = unraised.filter(|_| undo.is_empty()).collect();
+        let unraised: Vec<_> = unraised.filter(|_| may_be_event).collect();
         let near = nearest(id, unraised.iter().map(|(event, _)| event.as_str()));
         let other = unraised.iter().find(|(event, _)| near == Some(event.as_str()));
         let finding = Finding::error(COORD_UNKNOWN_REQUEST, message)
@@ -157,9 +158,9 @@ fn raised(deployment: &Deployment, chart: &Chart, known: &KnownEvents<'_>, findi
                 Some((event, at)) => finding.also(*at, format!("nothing raises `{event}`")),
                 None => finding.also(deployment.key_origin("configurations"), "the configurations of the deployment"),
             }
-            .help(match known.waited_for_as(id).filter(|_| undo.is_empty()) {
+            .help(match known.waited_for_as(id).filter(|_| may_be_event) {
                 Some(near) => format!("did you mean `{near}`, which is waited for and nobody raises?"),
-                None if id.contains('.') => help,
+                None if id.contains('.') || !may_be_event => help,
                 None if other.is_some() => and_also(&help, &format!("else list `{id}` under `emits`")),
                 None => and_also(&help, "an event that is meant to leave the deployment is listed under `emits`"),
             }),
@@ -234,11 +235,10 @@ fn heard(deployment: &Deployment, chart: &Chart, known: &KnownEvents<'_>, findin
                     .at(at)
                     .labelled("waits for it")
                     .also(deployment.key_origin("configurations"), "the configurations of the deployment")
-                    .help(did_you_mean(
-                        id,
-                        "configurations",
-                        asked_for(&ids, id).iter().map(String::as_str),
-                    )),
+                    .help(match nearest(id, asked_for(&ids, id).iter().map(String::as_str)) {
+                        Some(near) => answer_meant(deployment, near, &text[id.len()..]),
+                        None => did_you_mean(id, "configurations", ids.iter().copied()),
+                    }),
                 );
             } else if Verdict::ENDINGS.iter().any(|s| s.trim_start_matches('.') == suffix.trim_start_matches('.')) {
                 let undo = text.contains(".undo") || text.ends_with(".undone");
@@ -267,15 +267,31 @@ fn heard(deployment: &Deployment, chart: &Chart, known: &KnownEvents<'_>, findin
                     Finding::error(COORD_UNKNOWN_ANSWER, format!("`{event}` is no answer of a configurator"))
                         .at(at)
                         .labelled("waits for it")
-                        .help(did_you_mean(
+                        .help(answer_meant(
+                            deployment,
+                            text[..text.len() - suffix.len()].trim_end_matches('.'),
                             suffix,
-                            "answers",
-                            Verdict::ENDINGS.iter().map(|s| s.trim_start_matches('.')),
                         )),
                 );
             }
         }
     }
+}
+
+/// Which answer to what is asked for may have been meant, where what stands behind that is none.
+fn answer_meant(deployment: &Deployment, asked: &str, rest: &str) -> String {
+    let ask = EventName::new(asked).ok().and_then(|name| ask_of(deployment, name));
+    let answers: Vec<String> = ask.into_iter().flat_map(|ask| answers_to(ask).map(|event| event.to_string())).collect();
+    let whole = format!("{asked}.{}", rest.trim_start_matches('.'));
+    match nearest(&whole, answers.iter().map(String::as_str)) {
+        _ if answers.contains(&whole) => format!("did you mean `{whole}`?"),
+        Some(near) => format!("did you mean `{near}`?"),
+        None => did_you_mean(&whole, "answers", answers.iter().map(String::as_str)),
+    }
+}
+
+fn answers_to(ask: Ask) -> impl Iterator<Item = EventName> {
+    ask.verdicts().iter().map(move |verdict| verdict.event(ask))
 }
 
 /// How many transitions list an event.

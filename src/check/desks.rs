@@ -177,12 +177,15 @@ impl Desks {
             .iter()
             .filter(|active| batch.requests.iter().any(|undo| given_up_of(undo, &active.batch.requests).is_some()));
         let about: SmallVec<[u32; 2]> = of.map(|active| active.number).collect();
-        // Who stands in the queue as down may be taken up before a safe configuration makes everything wait.
-        let meddles = !told.is_empty() || !about.is_empty() || !safe.is_empty() && desk.waiting().any(Batch::is_down);
+        // What it answers by itself comes to the same whenever it comes. Who stands in the queue as down may be taken up before a safe
+        // configuration makes everything wait.
+        let meddles = !told.is_empty() && !desk.is_empty()
+            || !about.is_empty()
+            || !safe.is_empty() && desk.waiting().any(Batch::is_down);
         Coming { desk: after, arrived: arrival.in_order().collect(), stops, about, meddles }
     }
 
-    /// The next batch that may begin does while these safe configurations are being applied: its number. None goes alone.
+    /// The next batch that may begin does while these safe configurations are being applied: its number. None takes anything along.
     pub fn begin_next(&self, desk: &mut KeptDesk, safe: SmallVec<[ConfigId; 1]>, claims: &Claims) -> Option<u32> {
         self.once(&self.begins, desk, safe, |desk, safe| {
             desk.begin_next(claims, |_| None, &safe).map(|active| active.number)

@@ -213,17 +213,22 @@ impl Graph<'_, '_> {
         let (event, place) = (deployment.shutdown.event, self.product.place(state));
         let by = self.led_on_by(at, barred, bars, reaches);
         let named = by.map(|by| self.product.named(by)).unwrap_or_default();
+        let unended = match by {
+            Some(Move::Event(at)) => self.product.unended(state, self.product.outside[usize::from(at)]),
+            _ => None,
+        };
         let message = match barred {
             Barred::Again => format!("from `{place}` only a second `{event}` leads down, and it is raised once"),
             Barred::Closed => {
                 format!("from `{place}` only `{named}` leads down, which is refused when `{event}` has been raised")
             }
             Barred::Gone => {
-                let why = match by {
-                    Some(Move::Event(at)) if !fails(self.product.outside[usize::from(at)]) => {
-                        "nothing is sure to raise it there"
+                let why = match (by, unended) {
+                    (_, Some(child)) => format!("nobody has ended `{}` there", child.path),
+                    (Some(Move::Event(at)), _) if !fails(self.product.outside[usize::from(at)]) => {
+                        "nothing is sure to raise it there".to_owned()
                     }
-                    _ => "that comes only where something fails",
+                    _ => "that comes only where something fails".to_owned(),
                 };
                 format!("from `{place}` only `{named}` leads down, and {why}")
             }
@@ -250,6 +255,7 @@ impl Graph<'_, '_> {
         };
         let late = (0..self.product.members.len()).find(late).unwrap_or(0);
         let help = match barred {
+            Barred::Gone if let Some(child) = unended => format!("raise `{}` on the way there", child.ends),
             Barred::Again => "let an answer or a time lead on from there".to_owned(),
             Barred::Closed => still_comes(&named),
             Barred::Late => "give it more time with `shutdown.within_s`, or let something lead on sooner".to_owned(),

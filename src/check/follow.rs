@@ -239,8 +239,8 @@ impl<'a> Follower<'a> {
 
     /// The components that what is under way may be changing just now; none: any.
     fn busy(&self, state: &ProductState) -> Option<BTreeSet<ComponentName>> {
-        // What goes alone may take along frames that its text does not name.
-        if state.desk.under_way().iter().any(|turn| turn.alone.is_some()) {
+        // What is taken along its text does not name.
+        if state.desk.under_way().iter().any(|turn| turn.along.is_some()) {
             return None;
         }
         let under_way = state.desk.under_way().iter().flat_map(|turn| &turn.batch.requests).chain(&state.safe);

@@ -5,6 +5,7 @@ use super::desks::PlainBatch;
 use super::outcome::{ConcurrentWork, Held, Went, WorldId};
 use super::world::Worlds;
 use crate::model::ConfigId;
+use crate::stack::claims::Claim;
 use crate::stack::{Batch, Frame, FrameId, LedDown, Request, Requester, Stack, held};
 use smallvec::SmallVec;
 
@@ -101,9 +102,10 @@ impl Worlds<'_> {
         self.get(id).is_some_and(|world| world.stack.is_in_force(configuration))
     }
 
-    /// Whether a batch would go alone while everything is led down.
-    pub fn goes_alone(&self, id: WorldId, batch: &Batch) -> bool {
-        self.get(id).is_some_and(|world| world.stack.goes_alone(batch, LedDown::Whole))
+    /// What a batch would take along while everything is led down.
+    pub fn taken_along(&self, id: WorldId, batch: &Batch) -> Option<(LedDown, Claim)> {
+        let along = self.get(id)?.stack.taken_along(batch, LedDown::Whole, &self.claims)?;
+        Some((LedDown::Whole, along))
     }
 
     /// Of what an operator has frames in force, the oldest first.

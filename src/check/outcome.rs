@@ -60,8 +60,8 @@ pub struct ConcurrentWork {
     pub joined: bool,
     /// Its pushes have taken their place.
     pub placed: bool,
-    /// It has begun alone, while everything is led down.
-    pub alone: Option<LedDown>,
+    /// It takes along what stands in its way, while this is led down.
+    pub led: Option<LedDown>,
 }
 
 /// What the first requests of a batch come to.

@@ -468,8 +468,8 @@ impl<'a> Product<'a> {
 
 /// How a batch under way has begun; `desk`: as it stood at the state's desk.
 pub(super) fn as_begun(desk: &Desk, state: &ProductState, number: u32) -> ConcurrentWork {
-    let alone = desk.active(number).and_then(|active| active.alone);
-    ConcurrentWork { joined: state.joined.contains(&number), alone, ..ConcurrentWork::default() }
+    let led = desk.active(number).and_then(ActiveBatch::led);
+    ConcurrentWork { joined: state.joined.contains(&number), led, ..ConcurrentWork::default() }
 }
 
 /// Events that come to a coordinator from outside; what others alone raise comes from them, and only then.

@@ -9,6 +9,7 @@ use super::product::Product;
 use super::reactions::triggers;
 use super::state::{Failed, ProductState};
 use crate::model::codes::{COMPOSE_PROMISE, COMPOSE_UNLEFT};
+use crate::model::subsystem::IGNORED;
 use crate::model::{Ask, ConfigId, EventName, Finding};
 use crate::statechart::NodeId;
 use rustc_hash::FxHashMap;
@@ -68,8 +69,7 @@ impl Product<'_> {
     /// Whether an event is one of a subsystem that cannot tell anything: nobody has begun it.
     pub(super) fn is_silent(&self, state: &ProductState, name: EventName) -> bool {
         let mut children = self.children.iter().enumerate();
-        let told =
-            |child: &Child| name.local(child.path).is_some_and(|own| !own.ends_with(crate::model::subsystem::IGNORED));
+        let told = |child: &Child| name.local(child.path).is_some_and(|own| !own.ends_with(IGNORED));
         // Where it is known what it may tell, that says so.
         let unknown = |child: &Child| child.beliefs.is_none() || !child.ends_unbegun;
         children.any(|(at, child)| told(child) && unknown(child) && state.children & begun(at) == 0)
@@ -88,6 +88,17 @@ impl Product<'_> {
     /// Whether every subsystem is known to be down.
     pub(super) fn children_down(&self, state: &ProductState) -> bool {
         self.children_up(state).next().is_none()
+    }
+
+    /// The subsystem that is to tell by an event that it is down, or ignores the event that ends it, where nothing is known of it but that it
+    /// was begun and nobody has ended it.
+    pub(super) fn unended(&self, state: &ProductState, name: EventName) -> Option<&Child> {
+        let ignores = name.as_str().strip_suffix(IGNORED);
+        let told = |(at, child): &(usize, &Child)| {
+            let runs = state.children & begun(*at) != 0 && state.children & released(*at) == 0;
+            (name == child.down || ignores == Some(child.ends.as_str())) && child.beliefs.is_none() && runs
+        };
+        self.children.iter().enumerate().find(told).map(|(_, child)| child)
     }
 
     /// The subsystems that were begun, and of which it is not known that they are down.

@@ -6,6 +6,7 @@ use super::product::Product;
 use super::state::{Move, Next, ProductState};
 use crate::limits;
 use crate::model::Verdict;
+use crate::stack::ActiveBatch;
 use crate::stack::{Request, Why};
 use smallvec::SmallVec;
 
@@ -123,12 +124,12 @@ pub(super) fn under_way(state: &ProductState) -> impl Iterator<Item = &[Request]
     batches.chain(state.safe.iter().map(std::slice::from_ref))
 }
 
-/// How a batch goes that a state has under way: alone, where it takes along what stands in its way.
+/// How a batch goes that a state has under way, and whether it takes along what stands in its way.
 pub(super) fn goes(state: &ProductState, requests: &[Request]) -> ConcurrentWork {
     let one =
         |of: &Request| requests.iter().any(|request| same(std::slice::from_ref(of), std::slice::from_ref(request)));
     let active = state.desk.under_way().iter().find(|active| active.batch.requests.iter().any(one));
-    ConcurrentWork { alone: active.and_then(|active| active.alone), ..ConcurrentWork::default() }
+    ConcurrentWork { led: active.and_then(ActiveBatch::led), ..ConcurrentWork::default() }
 }
 
 /// Whether something is under way that was interrupted, or given up.

@@ -300,7 +300,7 @@ impl Next {
     }
 }
 
-/// A coordinator's bit.
+/// A coordinator's bit: there are no more of them than that ([`limits::COORDINATORS`](crate::limits::COORDINATORS)).
 pub fn bit(number: usize) -> u64 {
     1 << number.min(63)
 }

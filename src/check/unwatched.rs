@@ -10,7 +10,7 @@ use crate::model::codes::DEPLOY_UNWATCHED;
 use crate::model::monitor::is_monitors;
 use crate::model::{
     ChangeKind, ComponentName, ComponentType, Deployment, Direction, EventName, FAULTED, Finding, Findings, MemberRef,
-    Origin, RunState, Target, ValueType,
+    Origin, PortType, RunState, Target, ValueType,
 };
 use crate::statechart::Chart;
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -55,13 +55,25 @@ impl Look<'_> {
     fn finding(&self, name: ComponentName, (stands, why): (Origin, &str)) -> Finding {
         let message = format!("`{name}` may die unnoticed, and {why}");
         let origin = self.universe.of(name).first().map_or(Origin::NONE, |creation| creation.origin);
-        let port = self.types(name).flat_map(|ty| &ty.ports).find(|(_, port)| port.direction == Direction::Out);
-        let port = port.map_or_else(|| name.to_string(), |(port, _)| name.member(*port).to_string());
+        // Where nothing happens an event port is silent as well.
+        let sends = |port: &PortType| port.direction == Direction::Out && port.ty != ValueType::Event;
+        let port = self.types(name).flat_map(|ty| &ty.ports).find(|(_, port)| sends(port));
+        let port = port.map(|(port, _)| name.member(*port));
+        let fault = format!("let a transition hear `{name}.faulted`");
+        let help = match port {
+            // Of its own death it tells nothing.
+            _ if self.is(name, |ty| is_monitors(ty.name)) => format!(
+                "{fault}; or connect what it writes in every update (`is_NAME` of a monitor) to a component that raises an event when \
+                 that is silent"
+            ),
+            Some(port) => {
+                format!("let a monitor tell that `{port}` is silent, and a transition hear its event; or {fault}")
+            }
+            None => fault,
+        };
         let finding = Finding::warning(DEPLOY_UNWATCHED, message).at(origin).labelled("nobody watches it");
         let finding = if stands.is_some() { finding.also(stands, "what it stands for") } else { finding };
-        finding.path("monitors").help(format!(
-            "let a monitor tell that `{port}` is silent, and a transition hear its event; or let one hear `{name}.faulted`"
-        ))
+        finding.path("monitors").help(help)
     }
 
     fn types(&self, name: ComponentName) -> impl Iterator<Item = &ComponentType> {
@@ -143,7 +155,13 @@ impl Look<'_> {
         let mut read = FxHashSet::default();
         let heard = |event: EventName| self.hears(event);
         for monitor in self.deployment.monitors.iter().filter(|monitor| monitor.events().any(heard)) {
-            monitor.when.for_each_component(&mut |component, _| _ = read.insert(component));
+            // What runs it does not tell that it is dead itself.
+            let runs = |name: ComponentName| self.is(name, |ty| is_monitors(ty.name) && ty.name == monitor.run_by());
+            monitor.when.for_each_component(&mut |component, _| {
+                if !runs(component) {
+                    read.insert(component);
+                }
+            });
         }
         read
     }

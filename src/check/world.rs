@@ -211,7 +211,7 @@ impl<'a> Worlds<'a> {
             places: &[],
             joined: false,
             placed: false,
-            alone: None,
+            led: None,
             pushes: None,
         }
     }

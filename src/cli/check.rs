@@ -70,7 +70,7 @@ impl Run for Args {
                     left: Vec::new(),
                     verdict: CheckVerdict::Refused,
                 };
-                print_json(context, &report, &failure.sources);
+                print_json(context, &report, &failure.sources, false);
                 return Ok(failure.exit);
             }
             Err(failure) => {
@@ -100,7 +100,7 @@ impl Run for Args {
         };
         let exit = if no { Exit::No } else { Exit::Done };
         if self.json {
-            print_json(context, &report, &read.sources);
+            print_json(context, &report, &read.sources, interrupted);
             return Ok(exit);
         }
         let out = &context.out;
@@ -142,7 +142,8 @@ impl Run for Args {
                 format!("; followed through {states} and {transitions}, not all there are")
             }
         };
-        out.line(format!("{name}: {verdict}{reach}"));
+        let cut = if interrupted && no { ", interrupted" } else { "" };
+        out.line(format!("{name}: {verdict}{cut}{reach}"));
         report.left.iter().for_each(|left| out.line(format!("  {left}")));
         for line in bounds(&explored, &read.deployment, self.budget) {
             out.line(out.paint(Style::Dim, format!("  {line}")));
@@ -250,7 +251,7 @@ fn first_trace(report: &Report, notes: bool) -> Option<(usize, &[TraceStep])> {
     worth.next().map(|(number, (_, trace))| (number, trace.as_slice()))
 }
 
-fn print_json(context: &CommandContext, report: &Report, sources: &SourceMap) {
+fn print_json(context: &CommandContext, report: &Report, sources: &SourceMap, interrupted: bool) {
     let mut findings = to_json(&report.findings, sources);
     if let Some(findings) = findings.as_array_mut() {
         for (finding, trace) in findings.iter_mut().zip(&report.traces) {
@@ -260,7 +261,8 @@ fn print_json(context: &CommandContext, report: &Report, sources: &SourceMap) {
     let trace: Vec<String> =
         first_trace(report, true).map_or_else(Vec::new, |(_, trace)| trace.iter().map(ToString::to_string).collect());
     context.out.json(&json!({
-        "ok": report.verdict != CheckVerdict::Refused,
+        "ok": report.verdict != CheckVerdict::Refused && !(interrupted && report.verdict != CheckVerdict::Sound),
+        "interrupted": interrupted,
         "verdict": report.verdict.word(),
         "left": report.left,
         "findings": findings,

@@ -254,6 +254,7 @@ pub fn line(out: &Output, entry: &Json, steps: bool) -> String {
             format!("stopping   {stage}{why}")
         }
         "forced" => format!("{}     {}", out.paint(Style::Care, "forced"), text(&entry["note"])),
+        "noted" => format!("{}       {}", out.paint(Style::Care, "note"), text(&entry["note"])),
         other => format!("{other} {entry}"),
     };
     format!("{:>12.6}  {what}\n", entry["at"].as_f64().unwrap_or_default())

@@ -10,6 +10,7 @@ use super::status_view::indented;
 use super::{CommandContext, CommandFailure, CommandResult, Run};
 use crate::app::{Application, plan, plan_way, wrong_in_others};
 use crate::check::Until;
+use crate::model::codes::UNKNOWN_COMPONENT;
 use crate::model::finding::count;
 use crate::model::{MemberRef, RunState, Step};
 use crate::system::Reversibility;
@@ -57,7 +58,15 @@ impl Run for Args {
         };
         let told = planned.as_ref().err().map_or(&[][..], Vec::as_slice);
         context.out.findings(&wrong_in_others(&read, told), &read.sources);
-        let planned = planned.map_err(|findings| CommandFailure::found(findings, read.sources.clone()))?;
+        let planned = planned.map_err(|mut findings| {
+            // Names are typed as in that file.
+            if let Some(region) = region {
+                let before = format!("{}/", region.path());
+                let helps = findings.iter_mut().filter(|finding| finding.code == UNKNOWN_COMPONENT);
+                helps.filter_map(|finding| finding.help.as_mut()).for_each(|help| *help = help.replace(&before, ""));
+            }
+            CommandFailure::found(findings, read.sources.clone())
+        })?;
         let placed = placed(&read.deployment, &planned, region);
         if self.json {
             context.out.json(&placed.iter().map(|one| one.json(region)).collect::<Vec<_>>());

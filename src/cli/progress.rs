@@ -223,6 +223,7 @@ impl Screen {
                 self.line(format!("{time}  {word}  {}: {why}", stage.words()));
             }
             Happening::Forced { note } => self.line(format!("{time}  {}  {note}", out.paint(Style::Care, "forced"))),
+            Happening::Noted { note } => self.line(format!("{time}  {}  {note}", out.paint(Style::Care, "note"))),
             Happening::Dropped { events } => {
                 let word = out.paint(Style::Care, "dropped");
                 self.line(format!("{time}  {word}  {}: the coordinator does not keep up", count(events, "event")));

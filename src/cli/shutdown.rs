@@ -79,16 +79,18 @@ fn tell_waiting(out: Output, name: String, done: Arc<AtomicBool>) {
             clock.sleep(limits::SHUTDOWN_TOLD);
             let status = client.call("status", &json!({}), ASK).ok()?;
             let stopping: StoppingView = serde_json::from_value(status["stopping"].clone()).ok()?;
-            let what = match stopping.stands_still() {
-                Some(still) => still,
-                None if stopping.waits_for.is_empty() => format!("{} in {}", stopping.stage.words(), place(&status)),
-                None => stopping.waits_for.join(", "),
+            let (label, what) = match stopping.stands_still() {
+                Some(still) => ("waits for", still),
+                None if stopping.waits_for.is_empty() => {
+                    ("stopping ", format!("{} in {}", stopping.stage.words(), place(&status)))
+                }
+                None => ("waits for", stopping.waits_for.join(", ")),
             };
             if done.load(Ordering::Relaxed) {
                 return Some(());
             }
             if what != told {
-                out.line(format!("{}  {what}", out.paint(Style::Dim, "waits for")));
+                out.line(format!("{}  {what}", out.paint(Style::Dim, label)));
                 told = what;
             }
         }

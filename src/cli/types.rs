@@ -68,11 +68,13 @@ impl Run for Args {
                 // The name alone will do while only one library has it.
                 let only = by_last.next().filter(|_| by_last.next().is_none());
                 let Some(ty) = catalogue.iter().find(|ty| ty.name.as_str() == name).or(only) else {
-                    return Err(CommandFailure::no(
-                        CLI_UNKNOWN_TYPE,
-                        format!("there is no component type `{name}`"),
-                        did_you_mean(&name, "types", catalogue.iter().map(|ty| ty.name.as_str())),
-                    ));
+                    let of_library = |ty: &ComponentType| ty.name.as_str().split('.').next() == Some(&name);
+                    let help = match catalogue.iter().any(|ty| of_library(ty)) {
+                        true => format!("`davit types --library {name}` shows those of the library"),
+                        false => did_you_mean(&name, "types", catalogue.iter().map(|ty| ty.name.as_str())),
+                    };
+                    let message = format!("there is no component type `{name}`");
+                    return Err(CommandFailure::no(CLI_UNKNOWN_TYPE, message, help));
                 };
                 if self.json { out.json(&view(ty)) } else { one(out, ty) }
             }

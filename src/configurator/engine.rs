@@ -12,7 +12,7 @@ use super::running::{Purpose, Running};
 use super::safety::Safety;
 use super::suspects::Suspects;
 use super::switches::Fast;
-use crate::model::{Ask, ConfigId, Configuration, DeploymentLimits, Ident, Snapshot, Verdict};
+use crate::model::{Ask, ConfigId, Configuration, DeploymentLimits, Ident, RunState, Snapshot, Verdict};
 use crate::plan::PlanContext;
 use crate::platform::{Platform, PlatformEvent};
 use crate::stack::claims::Claims;
@@ -217,8 +217,10 @@ impl Engine {
             Some(whole) => SmallVec::from_slice(&[whole]),
             None => leaving_inside.1.iter().copied().map(LedDown::Inside).collect(),
         };
-        let alone = |batch: &Batch| led.iter().copied().find(|led| world.stack.goes_alone(batch, *led));
-        desk.begin_next(&given.claims, alone, &safe).map(|active| active.number)
+        let along = |batch: &Batch| {
+            led.iter().find_map(|led| Some((*led, world.stack.taken_along(batch, *led, &given.claims)?)))
+        };
+        desk.begin_next(&given.claims, along, &safe).map(|active| active.number)
     }
 
     /// Takes in what has come, waiting for something until `until`.
@@ -336,7 +338,7 @@ impl Engine {
             conditions.nudge();
         }
         match event {
-            PlatformEvent::Faulted { component, .. } => self.suspects.report(component),
+            PlatformEvent::Faulted { component, .. } => self.suspects.report_fault(component),
             PlatformEvent::Returned { component, .. } => {
                 self.suspects.report(component);
                 self.returned = true;
@@ -431,7 +433,11 @@ impl Engine {
         let system = system.then(|| match &self.snapshot {
             Some((of, snapshot)) if *of == (self.revision, self.world.system.revision()) => snapshot.clone(),
             _ => {
-                let snapshot = Arc::new(self.world.system.snapshot());
+                let mut snapshot = self.world.system.snapshot();
+                for name in self.suspects.faulted() {
+                    snapshot.components.entry(name).and_modify(|component| component.state = RunState::Faulted);
+                }
+                let snapshot = Arc::new(snapshot);
                 self.snapshot = Some(((self.revision, self.world.system.revision()), snapshot.clone()));
                 snapshot
             }

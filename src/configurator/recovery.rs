@@ -16,12 +16,18 @@ use crate::transaction::{PartEnd, Transaction};
 use std::sync::Arc;
 
 impl Engine {
-    /// The whole system as the platform sees it; none: no answer.
+    /// The whole system as the platform sees it; none: no answer, or safe configurations came each time while it was looked: what was seen
+    /// then may be from before that.
     pub(super) fn look(&mut self) -> Option<Snapshot> {
-        match self.ask(PlatformCall::Observe) {
-            Some(PoolReply::Observed(Ok(seen))) => Some(seen),
-            _ => None,
+        for _ in 0..limits::LOOKS_AGAIN {
+            let before = self.world.stack.next();
+            let Some(PoolReply::Observed(Ok(seen))) = self.ask(PlatformCall::Observe) else { return None };
+            self.after_safe();
+            if self.world.stack.next() == before {
+                return Some(seen);
+            }
         }
+        None
     }
 
     /// Has a worker make a call. Where none is made any more that is told.
@@ -108,19 +114,36 @@ impl Engine {
         }
         match direction {
             Recovery::Back => self.recover_back(),
-            Recovery::Accept => match self.look() {
-                Some(seen) if self.adopt(&seen).is_ok() => {
-                    self.world.stack.discard();
-                    self.world.broken.clear();
-                    self.confirmations.clear();
-                    self.changed();
-                    if let Some(progress) = &self.given.progress {
-                        progress(&Progress::Recovered);
-                    }
-                    Ok(())
+            Recovery::Accept => self.recover_accept(),
+        }
+    }
+
+    /// Takes what is there as the state, and gives the stack up.
+    fn recover_accept(&mut self) -> Result<(), Arc<Residual>> {
+        let before = self.world.stack.next();
+        let seen = self.look();
+        // Nobody who asked for this knows of what has come to be safe since: that stays in force until somebody asks once more.
+        let came = self.world.stack.frames().iter().find(|frame| frame.safe && frame.id >= before);
+        if let Some(frame) = came {
+            return Err(Arc::new(Residual::of(Reason::SafeCame(frame.configuration))));
+        }
+        match seen {
+            Some(seen) if self.running.is_empty() && self.adopt(&seen).is_ok() => {
+                self.world.stack.discard();
+                self.world.broken.clear();
+                self.confirmations.clear();
+                self.changed();
+                if let Some(progress) = &self.given.progress {
+                    progress(&Progress::Recovered);
                 }
-                _ => self.world.broken.first().map_or(Ok(()), |broken| Err(broken.residual.clone())),
-            },
+                Ok(())
+            }
+            // Of what is only in part in force nothing else is known.
+            _ => {
+                let broken = self.world.broken.first().map(|broken| &broken.residual);
+                let left = broken.or_else(|| self.partials.first().map(|(_, residual)| residual));
+                Err(left.cloned().unwrap_or_else(|| Arc::new(Residual::of(Reason::Busy))))
+            }
         }
     }
 

@@ -53,7 +53,7 @@ impl Engine {
         // Once it is taken down nothing begins that had not begun: the rest is answered by that.
         while !self.taking_down {
             let Some(active) = self.desk.active(number) else { return };
-            let (requests, alone) = (active.batch.requests.clone(), active.alone);
+            let (requests, led) = (active.batch.requests.clone(), active.led());
             // Given up together with one before it, of which it was to be taken up anew.
             if let Some(place) = active.given_up.iter().map(|given_up| given_up.place).min() {
                 self.cancel_behind(number, place, requests[place]);
@@ -71,7 +71,7 @@ impl Engine {
                 places: &places,
                 joined: false,
                 placed: false,
-                alone,
+                led,
                 pushes: None,
             };
             let mut group = take_up(&self.world, &requests, &rules);

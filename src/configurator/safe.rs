@@ -6,6 +6,7 @@
 use super::engine::Engine;
 use super::request::{Reason, Request};
 use super::running::{Purpose, Running};
+use super::safety::coming;
 use crate::model::{Ask, ComponentName, ConfigId, Step, Target, Verdict};
 use crate::stack::{BestEffort, Frame, Residual, SafeEnd, Stack, effort};
 use crate::system::{System, step, touch};
@@ -44,10 +45,11 @@ impl Engine {
         let at = self.given.clock.now();
         // What earlier safe ones will have done counts as done; but what both write only this one does.
         let (earlier, comes_after) = self.earlier_safe(&request);
-        let plan = |system: &System, stack: &Stack, earlier: &[Step]| {
-            effort(&with(system, earlier), stack, configuration, &request, at, &self.given.context)
+        let stack = self.stack_with_earlier(id);
+        let plan = |system: &System, earlier: &[Step]| {
+            effort(&with(system, earlier), &stack, configuration, &request, at, &self.given.context)
         };
-        let BestEffort { mut planned, frame, troubles } = plan(&self.world.system, &self.world.stack, &earlier);
+        let BestEffort { mut planned, frame, troubles } = plan(&self.world.system, &earlier);
         let mut yields = false;
         for other in self.running.iter_mut().filter(|other| comes_after.contains(&other.number)) {
             // Its own frame tells what it wanted, whoever does it.
@@ -55,13 +57,13 @@ impl Engine {
         }
         if yields {
             let (left, _) = self.earlier_safe(&request);
-            planned = plan(&self.world.system, &self.world.stack, &left).planned;
+            planned = plan(&self.world.system, &left).planned;
         }
         let mut touched = Touched::default();
         planned.steps.iter().for_each(|planned| touched.add(&planned.step));
         // The frame as it would be if what is interrupted had never been, and what is broken were as others had left it.
         let before = self.world.as_left_by_safe(before);
-        let frame = before.map_or(frame, |before| plan(&before, &self.world.stack, &earlier).frame);
+        let frame = before.map_or(frame, |before| plan(&before, &earlier).frame);
         frame.steps().iter().for_each(|planned| touched.add(&planned.step));
         for entry in configuration.pre.iter().chain(configuration.post.iter()) {
             if let Target::Component(component) = entry.target {
@@ -94,6 +96,20 @@ impl Engine {
             }
         }
         (steps, numbers)
+    }
+
+    /// The stack as those of its group leave it that are being applied: it takes their places.
+    fn stack_with_earlier(&self, id: ConfigId) -> Stack {
+        let mut stack = self.world.stack.clone();
+        for other in self.running.iter().rev() {
+            let Purpose::Safe(safe) = &other.purpose else { continue };
+            let (request, frame, _) = &**safe;
+            if matches!(request.ask, Ask::Apply(of) if self.given.claims.replaces(id, of)) {
+                let edits = self.safety.settled(other.machine.planned().parts[0].edits.clone());
+                stack = stack.expecting(edits, frame.clone(), coming(other.number));
+            }
+        }
+        stack
     }
 
     /// Components for which safe configurations that came before have steps that are not over.
@@ -154,7 +170,7 @@ impl Engine {
         // Also if it comes no further: what was interrupted heeds it. Calls are kept by its frame alone.
         self.safety.touched.join(touched.without_calls());
         let missed: Vec<Step> = machine.missed().cloned().collect();
-        let edits = machine.planned().parts[0].edits.clone();
+        let edits = self.safety.settled(machine.planned().parts[0].edits.clone());
         let end = machine.end();
         let mut troubles = self.safety.troubles_of(request.id);
         let mut broken = None;
@@ -167,6 +183,9 @@ impl Engine {
         let failed = broken.as_ref().map(|part| part.frame.as_ref());
         let how = SafeEnd { failed, missed: &missed, left_out: !troubles.is_empty(), interrupts: interrupted };
         let (pushed, verdict) = self.world.settle_safe(edits, frame, &how, &held);
+        if broken.is_none() {
+            self.safety.pushed.push((number, pushed));
+        }
         // What failed of it is nothing that it keeps.
         self.world.stack.frame(pushed).into_iter().for_each(|frame| touched.leaves(frame));
         if let Some(part) = &broken {
@@ -217,6 +236,7 @@ impl Engine {
         if self.running.iter().any(|running| running.is_safe() && !running.over) {
             return;
         }
+        self.safety.pushed.clear();
         let touched = std::mem::take(&mut self.safety.touched);
         for running in self.running.iter_mut().filter(|running| running.is_interrupted()) {
             running.machine.on(Input::Release(touched.clone()), &mut self.world.system);

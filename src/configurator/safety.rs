@@ -2,6 +2,7 @@
 
 use super::request::{Reason, Request};
 use crate::model::RequestId;
+use crate::stack::{Edits, FrameId};
 use crate::transaction::Touched;
 use std::collections::VecDeque;
 
@@ -14,9 +15,29 @@ pub(super) struct Safety {
     pub troubles: Vec<(RequestId, Vec<Reason>)>,
     /// What those that have ended touched, and what was interrupted was not told yet.
     pub touched: Touched,
+    /// The frames of those that have ended, by the numbers under which they were under way: those that came after may take their places.
+    pub pushed: Vec<(u64, FrameId)>,
+}
+
+/// Frames of safe configurations that are being applied have numbers from here on, by which those that come after know them.
+const COMING: u64 = 1 << 62;
+
+/// The number of the frame that one will leave which is under way under this number.
+pub(super) fn coming(number: u64) -> FrameId {
+    FrameId(COMING + number)
 }
 
 impl Safety {
+    /// What one does to the stack, as far as it is known by now: frames of those that came before and have ended have their numbers. One
+    /// that has ended *broken* leaves none that another one would take the place of: what was done of it stays.
+    pub fn settled(&self, mut edits: Edits) -> Edits {
+        for (id, _) in &mut edits.pops {
+            let ended = self.pushed.iter().find(|(number, _)| coming(*number) == *id);
+            *id = ended.map_or(*id, |(_, frame)| *frame);
+        }
+        edits
+    }
+
     /// What one that is over could not plan.
     pub fn troubles_of(&mut self, request: RequestId) -> Vec<Reason> {
         let at = self.troubles.iter().position(|(id, _)| *id == request);

@@ -23,12 +23,25 @@ struct SuspectLook {
 pub(super) struct Suspects {
     reported: Vec<ComponentName>,
     looks: Vec<SuspectLook>,
+    /// Of those, the ones whose fault was reported: they are shown so, while what is under way with them keeps anybody from looking.
+    faulted: FxHashSet<ComponentName>,
 }
 
 impl Suspects {
     /// A component is said to be faulted, or to have come back.
     pub fn report(&mut self, component: ComponentName) {
         self.reported.push(component);
+    }
+
+    /// A component has said that it is faulted.
+    pub fn report_fault(&mut self, component: ComponentName) {
+        self.report(component);
+        self.faulted.insert(component);
+    }
+
+    /// Those of whom the model does not know yet that they are faulted.
+    pub fn faulted(&self) -> impl Iterator<Item = ComponentName> + '_ {
+        self.faulted.iter().copied()
     }
 
     /// Reports were lost: anything may be faulted.
@@ -80,6 +93,7 @@ impl Suspects {
             };
             self.looks.remove(at);
             let faulted = seen.is_some_and(|seen| seen.state == RunState::Faulted);
+            changed |= self.faulted.remove(&component);
             if faulted && generation_of(system, component) != generation {
                 self.reported.push(component);
             } else if faulted {

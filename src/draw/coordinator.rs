@@ -134,8 +134,9 @@ impl Drawing<'_> {
         if !text.contains('.') {
             return self.index.get(&format!("{fqn}.{text}")).copied();
         }
-        let mut path = text;
-        while let Some(rest) = path.strip_prefix("root.") {
+        let mut path = text.strip_prefix("root.").unwrap_or(text);
+        // A state inside may be called like the outermost one.
+        while let Some(rest) = path.strip_prefix("root.").filter(|_| !self.index.contains_key("root.root")) {
             path = rest;
         }
         self.index.get(&format!("{ROOT}.{path}")).copied()

@@ -111,12 +111,27 @@ impl Resolve<'_> {
     fn fits(&self, cx: &mut Cx, own: &Deployment, subsystem: &Subsystem) {
         let name = subsystem.name;
         if (subsystem.own.platform, &subsystem.own.platform_options) != (own.platform, &own.platform_options) {
-            let message = format!("`{name}` is written for another platform than `{}`", own.platform);
-            let finding = Finding::error(codes::COMPOSE_DIFFERS, message).at(subsystem.origin);
-            let meant = nearest(own.platform.as_str(), std::iter::once(subsystem.own.platform.as_str()));
-            let meant = meant.filter(|near| *near != own.platform.as_str());
-            let meant = meant.map(|near| format!("did you mean `{near}`? Else ")).unwrap_or_default();
-            let help = format!("{meant}one platform counts for all of a deployment: write the same in both files");
+            let (platform, its) = (own.platform, subsystem.own.platform);
+            let near = nearest(platform.as_str(), std::iter::once(its.as_str())).filter(|_| platform != its);
+            // One slip of the deployment's file is told where it stands, and not once for each subsystem.
+            let (message, at, meant) = match near {
+                Some(near) => (
+                    format!("this deployment is for the platform `{platform}`, and a subsystem of it for `{its}`"),
+                    own.key_origin("platform"),
+                    // Which of the two there is, is not known here.
+                    format!("`{near}` or `{platform}`? One"),
+                ),
+                None => {
+                    let what = if platform == its {
+                        "gives other options to the platform"
+                    } else {
+                        "is written for another platform than"
+                    };
+                    (format!("`{name}` {what} `{platform}`"), subsystem.origin, "one".to_owned())
+                }
+            };
+            let help = format!("{meant} platform counts for all of a deployment: write the same in both files");
+            let finding = Finding::error(codes::COMPOSE_DIFFERS, message).at(at);
             cx.report(finding.also(subsystem.own.key_origin("platform"), "its platform").help(help));
         }
         for (inner, outer) in &subsystem.activities {

@@ -115,7 +115,10 @@ impl Params {
         for param in self.all.iter().filter(|p| !p.used) {
             let within = if param.set { self.place.within.as_str() } else { "" };
             let message = format!("no Lua file reads the parameter `{within}{}`", param.name);
-            let mut known: Vec<&str> = others.iter().filter(|n| **n != param.name).map(String::as_str).collect();
+            // As the command line names them: `--set left.gain=1`.
+            let others: Vec<String> =
+                others.iter().filter(|n| **n != param.name).map(|name| format!("{within}{name}")).collect();
+            let mut known: Vec<&str> = others.iter().map(String::as_str).collect();
             // `--set left.gain=1` is of a subsystem; another name before the point may be meant for one.
             let dotted = param.set && matches!(param.value.kind, Kind::Map(_));
             let subsystems: Vec<&str> =
@@ -130,7 +133,7 @@ impl Params {
                 None => {
                     let what = if subsystems.is_empty() { "parameters" } else { "parameters and subsystems" };
                     known.extend(subsystems);
-                    did_you_mean(&param.name, what, known)
+                    did_you_mean(&format!("{within}{}", param.name), what, known)
                 }
             };
             let finding = if param.set {

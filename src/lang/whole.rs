@@ -36,6 +36,8 @@ struct DeploymentReader<'a> {
     open: Vec<(PathBuf, Origin)>,
     /// Instances so far.
     instances: usize,
+    /// Coordinators of all files so far.
+    coordinators: usize,
     /// What the same file, given the same, came to.
     known: FxHashMap<(PathBuf, String), Option<Arc<Deployment>>>,
 }
@@ -43,8 +45,14 @@ struct DeploymentReader<'a> {
 /// A deployment's file with all that it names.
 pub fn deployment(cx: &mut Cx, from: &Sources, path: &Path, options: &LoadOptions) -> Option<Deployment> {
     let known = FxHashMap::default();
-    let mut reader =
-        DeploymentReader { from, options, open: vec![(path.to_path_buf(), Origin::NONE)], instances: 0, known };
+    let mut reader = DeploymentReader {
+        from,
+        options,
+        open: vec![(path.to_path_buf(), Origin::NONE)],
+        instances: 0,
+        coordinators: 0,
+        known,
+    };
     let part =
         GivenPart { of: "the command line".to_owned(), within: String::new(), given: Vec::new(), at: Origin::NONE };
     reader.deployment(cx, path, part, &options.set)
@@ -98,7 +106,7 @@ impl DeploymentReader<'_> {
         }
         let mut with = draft.with;
         let at = if part.at.is_some() { part.at } else { origin };
-        for entry in interface::given(cx, declared, given, (&part.of, &part.within), at) {
+        for entry in interface::given(cx, (declared, &draft.ill), given, (&part.of, &part.within), at) {
             if let Some(twice) = with.iter().find(|other| other.key == entry.key) {
                 let message = format!("`{}` is a parameter, and given under `with` too", entry.key);
                 let finding = Finding::error(codes::TEXT_DUPLICATE_KEY, message).at(twice.origin);
@@ -122,6 +130,13 @@ impl DeploymentReader<'_> {
         }
         unique(cx, &mut configurations);
         let (mut charts, mut programs) = (Vec::new(), BTreeMap::new());
+        self.coordinators += draft.coordinators.len();
+        if let (true, Some((.., named_at))) = (self.coordinators > limits::COORDINATORS, draft.coordinators.last()) {
+            let message = format!("there are more than {} coordinators in all", limits::COORDINATORS);
+            let finding = Finding::error(codes::TEXT_TOO_LARGE, message).at(*named_at);
+            cx.report(finding.help("take the deployment apart"));
+            return None;
+        }
         let trust = draft.trusted.map(|open| {
             let named = draft.host.iter().map(|(file, origin)| (folder.join(file), *origin));
             Trust { open, host: named.chain(host_files(&options.host)).collect(), tell_fields: false }

@@ -420,6 +420,8 @@ codes! {
         "In SCXML `e` also means `e.x` and `e.y`, and so does `e.*`; here names are compared whole. The names of the document that begin so are added; others, that come from outside only, are not meant. List every event that is meant.";
     SCXML_SENT_HOME = "scxml::sent_home", "an event would come back to the chart in SCXML",
         "A `<send>` without a target puts the event into the chart's own queue. Here a name that is raised leaves the coordinator: it is a request, or an event for others. Write a target if that is meant; else go to the state in question.";
+    SCXML_OUTLIVES = "scxml::outlives", "a delayed event would come in SCXML also when its state was left",
+        "In SCXML a `<send>` with a delay comes when its time is over, whatever state the chart is in by then, unless a `<cancel>` takes it back. Here it is a time event of the state that sends it on its entry, and ends with that. Take it back on exit of that state (`<onexit><cancel sendid=\"…\"/></onexit>`), which means the same in both.";
     // ---- stack -----------------------------------------------------------------------------------------------------
     STACK_EMPTY = "stack::empty", "there is nothing to undo",
         "The stack holds no frame that could be popped: nothing was applied, or all of it was undone already, or it was committed. `davit stack` shows the frames.";

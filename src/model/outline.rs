@@ -107,7 +107,11 @@ impl<'m> Outline<'m> {
             return self.child(scope, text);
         }
         let start = if text.starts_with('.') { scope } else { 0 };
-        let mut pieces = text.trim_matches(is_separator).split(is_separator).skip_while(|piece| *piece == ROOT);
-        pieces.try_fold(start, |at, piece| self.child(at, piece))
+        let pieces: Vec<&str> = text.trim_matches(is_separator).split(is_separator).collect();
+        // A state inside may be called like the outermost one.
+        let named = self.child(start, ROOT).is_some();
+        let outermost = pieces.iter().take_while(|piece| **piece == ROOT).count();
+        let mut rest = pieces[if named { outermost.min(1) } else { outermost }..].iter();
+        rest.try_fold(start, |at, piece| self.child(at, piece))
     }
 }

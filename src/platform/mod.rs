@@ -208,6 +208,7 @@ pub trait Watch: Send {
     /// Whether the platform can show this input, of those it was asked for, at all.
     fn shows(&self, input: usize) -> bool;
 
-    /// The newest samples, in the order of the inputs. What is not there is absent.
+    /// The newest samples, in the order of the inputs. What is not there is absent. It waits for nothing: what is applied meanwhile, and is
+    /// safe, would wait with it.
     fn look(&mut self, now: Time, samples: &mut [InputSample]);
 }

@@ -9,6 +9,7 @@ use serde_json::Value as Json;
 use std::fs::File;
 use std::io;
 use std::os::unix::net::{UnixListener, UnixStream};
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::sync::{Arc, Condvar, Mutex, PoisonError, Weak};
 
@@ -164,7 +165,8 @@ impl Doors {
 
 /// Answers one connection to its end.
 fn attend(connection: &Arc<SocketConnection>, shared: &ServingShared, kept: bool) {
-    let _ = serve(connection, shared, kept);
+    // One thread is for all that are kept: what panics in one of them is nothing of the next one's.
+    let _ = catch_unwind(AssertUnwindSafe(|| serve(connection, shared, kept)));
     shared.subscribers.remove(connection.number);
     connection.cut();
 }

@@ -70,7 +70,7 @@ impl Session {
         let mut ticket = match self.offer_watched(bring_up.event, "deployment") {
             Ok(offered) => Some(offered.ticket),
             Err(refused) => {
-                hub.note(Happening::Forced { note: format!("`{}` was not delivered: {refused}", bring_up.event) });
+                hub.note(Happening::Noted { note: format!("`{}` was not delivered: {refused}", bring_up.event) });
                 None
             }
         };
@@ -147,7 +147,7 @@ impl Session {
              `davit shutdown` leads it down",
             took.as_secs_f64().round()
         );
-        self.hub().note(Happening::Forced { note });
+        self.hub().note(Happening::Noted { note });
     }
 
     /// Waits until somebody commands the end. A deployment that breaks meanwhile stays: its coordinator decides. One whose
@@ -178,7 +178,7 @@ impl Session {
         };
         let note = format!("what drives `{}` has panicked: {}", self.deployment().name, panic_text(&*panic));
         let ended = survived(|| {
-            let _ = survived(|| self.hub().note(Happening::Forced { note }));
+            let _ = survived(|| self.hub().note(Happening::Noted { note }));
             // Nothing is there any more that could be stopped.
             self.ended().unwrap_or_else(|| self.stop(false, self.hub().phase() == Phase::Deploying))
         });

@@ -115,6 +115,11 @@ pub enum Happening {
         /// What.
         note: String,
     },
+    /// Something that whoever reads has to know, and that nobody asked for: what was not delivered, why it stands still, what is otherwise.
+    Noted {
+        /// What.
+        note: String,
+    },
     /// A coordinator does not keep up: events found its inbox full and were dropped.
     Dropped {
         /// How many since this was last told.

@@ -13,7 +13,8 @@ use crate::time::lock;
 use serde::Serialize;
 use serde_json::Value as Json;
 use std::cell::RefCell;
-use std::sync::Arc;
+use std::collections::BTreeSet;
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 /// What a member is.
@@ -75,6 +76,14 @@ pub(super) struct FoundMember {
     unit: Option<Arc<str>>,
 }
 
+/// What operators have set, as a configuration each.
+#[derive(Default)]
+pub(super) struct Settings {
+    /// Held while something is being set: one at a time. Who only asks what has been set does not wait for that.
+    one: Mutex<()>,
+    all: Mutex<BTreeSet<ConfigId>>,
+}
+
 impl Session {
     /// What a property or port is worth now. Of what a component sends, within that (real) time.
     ///
@@ -115,7 +124,7 @@ impl Session {
     pub fn set(&self, line: u32, name: &str, value: &Json, force: bool) -> Result<RequestId, NoMember> {
         let FoundMember { member, kind, ty, .. } = self.member(name)?;
         let wanted = |why: String| no(format!("`{member}` is a {ty}: {why}"), format!("give a value of the type {ty}"));
-        let value = value_of(value).map_err(wanted)?.fit(&ty).map_err(|why| wanted(why.to_string()))?;
+        let value = value_of(value, &ty).map_err(wanted)?.fit(&ty).map_err(|why| wanted(why.to_string()))?;
         let change = match kind {
             MemberKind::Property => ChangeKind::PropertySet { property: member, value },
             MemberKind::In => ChangeKind::PortWrite { port: member, value },
@@ -130,20 +139,20 @@ impl Session {
         let configuration = Configuration::setting(id, change);
         let listed = self.deployment().operator.iter().any(|(may, _)| *may == OperatorMay::Set(member));
         // One at a time: what is asked for and has not begun must not become another value.
-        let mut set = lock(self.settings());
+        let _one = lock(&self.settings().one);
         if self.hub().is_outstanding(Ask::Apply(id)) {
             return Err(no(format!("`{member}` is being set already"), "wait for the answer to that"));
         }
         if !self.configurator().define(configuration, listed, self.clock().now() + limits::VIEW) {
             return Err(no(Unanswered.to_string(), "something may keep it busy: `davit status` shows it"));
         }
-        set.insert(id);
+        lock(&self.settings().all).insert(id);
         Ok(self.request_on(line, Ask::Apply(id), "operator", force))
     }
 
     /// The one of that name that an operator has set.
     pub fn setting(&self, name: &str) -> Option<ConfigId> {
-        lock(self.settings()).iter().find(|id| id.as_str() == name).copied()
+        lock(&self.settings().all).iter().find(|id| id.as_str() == name).copied()
     }
 
     /// Of a component that is there.
@@ -186,8 +195,8 @@ fn unknown(component: ComponentName, member: &str, ty: &ComponentType) -> NoMemb
     no(format!("`{component}` has no property or port `{member}`"), did_you_mean(member, "properties and ports", known))
 }
 
-/// A value as JSON has it.
-fn value_of(json: &Json) -> Result<Value, String> {
+/// A value as JSON has it, of this type if it is in order. Names of fields that the type does not have are kept nowhere.
+fn value_of(json: &Json, ty: &ValueType) -> Result<Value, String> {
     Ok(match json {
         Json::Null => return Err("null is no value".to_owned()),
         Json::Bool(is) => Value::Bool(*is),
@@ -196,10 +205,16 @@ fn value_of(json: &Json) -> Result<Value, String> {
             None => Value::Float(number.as_f64().ok_or_else(|| format!("{number} is no number that can be kept"))?),
         },
         Json::String(text) => Value::str(text),
-        Json::Array(elements) => Value::Array(elements.iter().map(value_of).collect::<Result<_, _>>()?),
+        Json::Array(elements) => {
+            let of = if let ValueType::Array(of, _) = ty { of } else { ty };
+            Value::Array(elements.iter().map(|element| value_of(element, of)).collect::<Result<_, _>>()?)
+        }
         Json::Object(fields) => {
+            let own: &[(Ident, ValueType)] = if let ValueType::Record(own) = ty { own } else { &[] };
             let field = |(name, value): (&String, &Json)| {
-                Ok((Ident::new(name).map_err(|why| why.to_string())?, value_of(value)?))
+                let known = own.iter().find(|(known, _)| known.as_str() == name);
+                let (known, of) = known.ok_or_else(|| format!("it has no field `{name}`"))?;
+                Ok((*known, value_of(value, of)?))
             };
             Value::Record(fields.iter().map(field).collect::<Result<_, String>>()?)
         }

@@ -35,7 +35,7 @@ impl Session {
     /// Gives an event to all coordinators, in the name of `from`; where that is refused it is written down.
     pub fn raise(&self, event: EventName, from: &str) {
         if let Err(refused) = self.offer(event, from) {
-            self.hub().note(Happening::Forced { note: format!("`{event}` was not delivered: {refused}") });
+            self.hub().note(Happening::Noted { note: format!("`{event}` was not delivered: {refused}") });
         }
     }
 
@@ -156,8 +156,7 @@ impl Session {
         let again = || make_safe(self.hub(), self.configurator(), event, Class::Outside);
         let acted = acted.or_else(|| gone.then(again).flatten());
         if gone && acted.is_none() {
-            self.hub()
-                .note(Happening::Forced { note: format!("`{event}` was not delivered: the coordinator is gone") });
+            self.hub().note(Happening::Noted { note: format!("`{event}` was not delivered: the coordinator is gone") });
         }
         // One that has acted by itself is heard by nobody: what they kept of it would act once more when force is asked for.
         let inside = if acted.is_some() { Vec::new() } else { inside };

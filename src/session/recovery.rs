@@ -32,6 +32,8 @@ enum How {
     Faulted,
     /// A call of the component has not returned.
     Quarantined,
+    /// A part of what is in force could not be done, and nothing of it is left over.
+    Missing,
 }
 
 /// What it is about.
@@ -39,7 +41,11 @@ enum How {
 #[serde(untagged)]
 enum DifferenceIn {
     Step(Step),
-    Component { target: ComponentName },
+    Component {
+        target: ComponentName,
+    },
+    /// What is not there.
+    Nothing {},
 }
 
 impl Difference {
@@ -72,7 +78,11 @@ impl Difference {
         let residuals = view.residuals.iter().map(|residual| &**residual).chain(&view.partial);
         let mut all: Vec<Self> = Vec::new();
         let quarantined = view.quarantined.iter().map(|name| Self::component(How::Quarantined, *name));
-        for one in residuals.flat_map(Self::of_residual).chain(quarantined) {
+        let missing = view.partial.iter().filter(|residual| residual.is_empty()).map(|residual| {
+            let text = format!("not done: {}", residual.cause);
+            Self { how: How::Missing, what: DifferenceIn::Nothing {}, text }
+        });
+        for one in residuals.flat_map(Self::of_residual).chain(quarantined).chain(missing) {
             // A call that was out then may have come back since.
             let back = |name: &ComponentName| one.how == How::Quarantined && !view.quarantined.contains(name);
             let over = matches!(&one.what, DifferenceIn::Component { target } if back(target));
@@ -146,7 +156,7 @@ impl Session {
         self.refresh_phase();
         let residual = ended.err();
         if let Some(residual) = &residual {
-            self.hub().note(Happening::Forced { note: format!("not recovered: {residual}") });
+            self.hub().note(Happening::Noted { note: format!("not recovered: {residual}") });
         }
         Some(Recovered {
             recovered: residual.is_none(),

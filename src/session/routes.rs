@@ -191,7 +191,7 @@ impl Listener for ToConfigurator {
                     });
                     self.deliver(Incoming::new(Class::Notice, event).tagged(Some(Tag::from(*raised))));
                 }
-                Meaning::Unknown(name) => self.hub.note(Happening::Forced {
+                Meaning::Unknown(name) => self.hub.note(Happening::Noted {
                     note: format!("`{name}` was raised: no configuration, and not declared under `emits`"),
                 }),
             }
@@ -270,11 +270,11 @@ impl Listener for ToConfigurator {
 
     fn ended(&mut self, why: &str) {
         let note = format!("the coordinator `{}` has ended and leads no more: {why}", self.name);
-        self.hub.note(Happening::Forced { note });
+        self.hub.note(Happening::Noted { note });
     }
 
     fn trouble(&mut self, chart: &Chart, trouble: ChartTrouble) {
-        self.hub.note(Happening::Forced { note: trouble.finding(chart).message });
+        self.hub.note(Happening::Noted { note: trouble.finding(chart).message });
     }
 }
 
@@ -370,9 +370,9 @@ pub(super) fn on_progress(hub: &Hub, junction: &Junction, steps: &Steps, progres
             steps.note(*request, noted);
         }
         Progress::Survived(text) => {
-            hub.note(Happening::Forced { note: format!("the configurator itself failed and goes on: {text}") });
+            hub.note(Happening::Noted { note: format!("the configurator itself failed and goes on: {text}") });
         }
-        Progress::Stuck(why) => hub.note(Happening::Forced { note: why.clone() }),
+        Progress::Stuck(why) => hub.note(Happening::Noted { note: why.clone() }),
         Progress::Lost { configuration, reason } => {
             let event = Verdict::Lost.event(Ask::Apply(*configuration));
             let reasons = reason.findings().into_iter().map(|finding| finding.message).collect();
@@ -386,7 +386,7 @@ pub(super) fn on_progress(hub: &Hub, junction: &Junction, steps: &Steps, progres
                 subsystems.emptied(*path, hub, junction);
             }
         }
-        Progress::Differs(residual) => hub.note(Happening::Forced { note: residual.cause.to_string() }),
+        Progress::Differs(residual) => hub.note(Happening::Noted { note: residual.cause.to_string() }),
         Progress::Recovered => {
             hub.note(Happening::Recovered { steps: steps.take(RequestId(0)) });
         }
@@ -458,7 +458,7 @@ pub(super) fn on_platform(hub: &Hub, junction: &Junction, event: &PlatformEvent)
         }
     };
     if hub.is_stopping() && junction.begins(event) {
-        hub.note(Happening::Forced { note: format!("`{event}` of `{from}` is passed over: {NO_MORE}") });
+        hub.note(Happening::Noted { note: format!("`{event}` of `{from}` is passed over: {NO_MORE}") });
         return;
     }
     hub.raised(event, from);

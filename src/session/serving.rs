@@ -80,11 +80,17 @@ pub(super) struct ServedCalls {
 
 impl ServedCalls {
     pub fn run<T>(&self, call: impl FnOnce() -> T) -> T {
+        /// Also a call that panics is over.
+        struct Open<'c>(&'c ServedCalls);
+        impl Drop for Open<'_> {
+            fn drop(&mut self) {
+                *lock(&self.0.open) -= 1;
+                self.0.ended.notify_all();
+            }
+        }
         *lock(&self.open) += 1;
-        let result = call();
-        *lock(&self.open) -= 1;
-        self.ended.notify_all();
-        result
+        let _open = Open(self);
+        call()
     }
 
     /// Waits until all are answered, at most as long as writing to a client may take.

@@ -103,7 +103,7 @@ impl Session {
                     let note = format!(
                         "{what}: what is left stays as it is until a signal (Ctrl-C) or `davit shutdown --force` asks for force anew"
                     );
-                    hub.note(Happening::Forced { note });
+                    hub.note(Happening::Noted { note });
                     hub.halt().hold(true);
                     self.wait_for_force();
                     hub.halt().hold(false);
@@ -214,7 +214,7 @@ impl Session {
         let mut stood: Option<Time> = None;
         let ticket = self.offer_watched(take_down.event, "deployment");
         if let Err(refused) = &ticket {
-            hub.note(Happening::Forced { note: format!("`{}` was not delivered: {refused}", take_down.event) });
+            hub.note(Happening::Noted { note: format!("`{}` was not delivered: {refused}", take_down.event) });
         }
         let ticket = ticket.map(|offered| offered.ticket).ok();
         let unheard = || ticket.is_some_and(|ticket| hub.was_heard(ticket) == Some(false));
@@ -257,7 +257,7 @@ impl Session {
                     Err(unanswered) => unanswered.to_string(),
                 };
                 if !std::mem::replace(&mut said, true) {
-                    hub.note(Happening::Forced { note });
+                    hub.note(Happening::Noted { note });
                 }
                 deadline = now + take_down.within;
             }

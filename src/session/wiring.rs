@@ -5,6 +5,7 @@ use super::halt::StoppingView;
 use super::hub::Hub;
 use super::life::{Ended, UNSEEN, leftovers};
 use super::log::{FrameStatus, Happening, Phase, StatusView};
+use super::members::Settings;
 use super::parts::{CoordinatorPart, between};
 use super::recovery::Difference;
 use super::routes::{Junction, on_answer, on_platform, on_progress};
@@ -60,7 +61,7 @@ pub struct Session {
     junction: Arc<Junction>,
     evaluator: Option<Arc<Evaluator>>,
     /// What operators have set, as a configuration each.
-    settings: Mutex<BTreeSet<ConfigId>>,
+    settings: Settings,
     commands: Mutex<Vec<Command>>,
     /// Set by every command.
     commanded: Mutex<Option<Arc<AtomicBool>>>,
@@ -121,7 +122,7 @@ impl Session {
             configurator,
             junction,
             evaluator,
-            settings: Mutex::default(),
+            settings: Settings::default(),
             commands: Mutex::new(Vec::new()),
             commanded: Mutex::default(),
             attended: AtomicBool::new(true),
@@ -144,7 +145,7 @@ impl Session {
         &self.platform
     }
 
-    pub(super) fn settings(&self) -> &Mutex<BTreeSet<ConfigId>> {
+    pub(super) fn settings(&self) -> &Settings {
         &self.settings
     }
 

@@ -39,8 +39,8 @@ pub struct Rules<'a> {
     pub joined: bool,
     /// Its pushes have taken their place on the stack when they began: what others hold on to since does not matter.
     pub placed: bool,
-    /// It has begun alone, while this is led down: what operators have put in the way of its undos goes with these.
-    pub alone: Option<LedDown>,
+    /// It takes along what operators have put in the way of its undos, while this is led down.
+    pub led: Option<LedDown>,
     /// What is known of pushes in the system of the world; none: each is planned.
     pub pushes: Option<PushesOf<'a>>,
 }
@@ -167,7 +167,7 @@ fn add(
     repaired: bool,
 ) -> Result<(), Refusal> {
     match op {
-        Op::Undo(id) => match rules.alone.filter(|led| led.is_led_by(request.requester)) {
+        Op::Undo(id) => match rules.led.filter(|led| led.is_led_by(request.requester)) {
             Some(led) => {
                 let with = along(world, &work.frames, request, *id, (led, repaired));
                 work.add_undo(*id, &with.map_err(|found| Refusal::one(*found))?)

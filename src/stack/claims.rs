@@ -2,7 +2,8 @@
 //! same time (semantics: *Requests*).
 
 use super::contenders::{contenders, may_hold};
-use super::request::{LedDown, Request, Requester};
+use super::request::{Request, Requester};
+use super::{Frame, share};
 use crate::model::names::is_within;
 use crate::model::{Ask, Catalogue, ChangeKind, ComponentName, ConfigId, Configuration, Ident, Target};
 use rustc_hash::FxHashMap;
@@ -172,12 +173,16 @@ impl Claims {
         path.is_empty() || requests.clone().into_iter().any(belongs) || self.inside(path).meets(&self.of(requests))
     }
 
-    /// What is led down.
-    pub fn of_led(&self, led: LedDown) -> Claim {
-        match led {
-            LedDown::Whole => Claim::all(),
-            LedDown::Inside(path) => self.inside(path.as_str()),
+    /// What a frame is about: everything, where that is more than the configurations of the deployment name.
+    pub fn of_frame(&self, frame: &Frame) -> Claim {
+        let mut claim = Claim::default();
+        for component in share::components(&frame.footprint) {
+            match self.numbers.get(&component) {
+                Some(at) => claim.set(*at),
+                None => return Claim::all(),
+            }
         }
+        claim
     }
 
     /// What a requester's file, and those of its subsystems, are about.

@@ -4,7 +4,7 @@
 //! the same coordinator, or of the same connection of an operator, is over. Then it has all of that until its last request is answered. So no cycle of waits can
 //! arise, and none starves.
 
-use super::claims::{Claims, is_of_system};
+use super::claims::{Claim, Claims, is_of_system};
 use super::request::{Batch, LedDown, Request, Requester, Why};
 use super::{Reason, answer};
 use crate::model::{Ask, ConfigId, Verdict};
@@ -20,11 +20,18 @@ pub struct ActiveBatch {
     pub batch: Batch,
     /// Undos that have given up requests of it, in the order in which they came.
     pub given_up: Vec<GivenUp>,
-    /// It has all that is led down until it is over: what its undos take along is not known from its text
-    /// ([`Stack::goes_alone`]).
+    /// While this is led down its undos take along what operators have put in their way, which they claim as well until it is over
+    /// ([`Stack::taken_along`]).
     ///
-    /// [`Stack::goes_alone`]: super::Stack::goes_alone
-    pub alone: Option<LedDown>,
+    /// [`Stack::taken_along`]: super::Stack::taken_along
+    pub along: Option<(LedDown, Claim)>,
+}
+
+impl ActiveBatch {
+    /// What is led down while its undos take something along.
+    pub fn led(&self) -> Option<LedDown> {
+        self.along.as_ref().map(|(led, _)| *led)
+    }
 }
 
 /// An undo that has given up a request of a batch under way.
@@ -203,37 +210,40 @@ impl Desk {
         gone
     }
 
-    /// The next batch that may begin; it is under way from now on. `alone` says which would begin alone, `safe` are the safe
+    /// The next batch that may begin; it is under way from now on. `along` says what one would take along, `safe` are the safe
     /// configurations that are being applied: what they would interrupt waits for them.
     pub fn begin_next(
         &mut self,
         claims: &Claims,
-        alone: impl Fn(&Batch) -> Option<LedDown>,
+        along: impl Fn(&Batch) -> Option<(LedDown, Claim)>,
         safe: &[ConfigId],
     ) -> Option<&ActiveBatch> {
         let at = if self.under_way.is_empty() && safe.is_empty() {
             // Whatever else waits came later.
             (!self.waiting.is_empty()).then_some(0)
         } else {
-            self.free(claims, &alone, safe)
+            self.free(claims, &along, safe)
         }?;
         let batch = self.waiting.remove(at)?;
         let number = (0..).find(|n| self.under_way.iter().all(|active| active.number != *n))?;
-        let alone = alone(&batch);
-        self.under_way.push(ActiveBatch { number, batch, given_up: Vec::new(), alone });
+        let along = along(&batch);
+        self.under_way.push(ActiveBatch { number, batch, given_up: Vec::new(), along });
         self.under_way.last()
     }
 
-    fn free(&self, claims: &Claims, alone: impl Fn(&Batch) -> Option<LedDown>, safe: &[ConfigId]) -> Option<usize> {
+    fn free(
+        &self,
+        claims: &Claims,
+        along: impl Fn(&Batch) -> Option<(LedDown, Claim)>,
+        safe: &[ConfigId],
+    ) -> Option<usize> {
         let mut held = claims.of(self.under_way.iter().flat_map(|active| &active.batch.requests));
-        for led in self.under_way.iter().filter_map(|active| active.alone) {
-            held.join(&claims.of_led(led));
-        }
+        self.under_way.iter().filter_map(|active| active.along.as_ref()).for_each(|(_, along)| held.join(along));
         let mut asking: Vec<Line> = self.under_way.iter().filter_map(|active| line(&active.batch)).collect();
         for (at, batch) in self.waiting.iter().enumerate() {
             let mut claim = claims.of(&batch.requests);
-            if let Some(led) = alone(batch) {
-                claim.join(&claims.of_led(led));
+            if let Some((_, along)) = along(batch) {
+                claim.join(&along);
             }
             let waits = || safe.iter().any(|safe| claims.interrupts(*safe, &batch.requests));
             if !claim.meets(&held) && line(batch).is_none_or(|by| !asking.contains(&by)) && !waits() {

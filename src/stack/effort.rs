@@ -3,12 +3,14 @@
 //! It is planned whole where that goes; else piece by piece, each piece by itself. What concerns a component that is not
 //! there has nothing to be made safe, and is left out.
 
+use super::share::shares;
+use super::squash::{list, squash};
 use super::void::rest;
 use super::work::{Op, Part, Planned, transaction};
 use super::{Edits, Frame, FrameId, Inverse, Reason, Request, Stack};
 use crate::model::{Change, Configuration, StateList, Step, codes};
 use crate::plan::footprint::Footprint;
-use crate::plan::undo::items;
+use crate::plan::undo::{DraftStep, items};
 use crate::plan::{PlanContext, PlannedStep, plan_on};
 use crate::system::{Overlay, System};
 use crate::time::Time;
@@ -43,6 +45,34 @@ pub fn effort(
         },
         Err(_) => piecewise(system, configuration, request, at, context),
     }
+}
+
+/// The frame of a safe configuration of a group takes the others of that group over that are still there: it did not find them yet when it
+/// was planned (an emergency comes again while the first is being applied), or could not be planned whole. Its undo leads to where theirs
+/// would have led.
+pub(super) fn take_over_group(frames: &mut Vec<Arc<Frame>>, pushed: FrameId, busy: &[FrameId]) {
+    let Some(mut at) = frames.iter().position(|frame| frame.id == pushed) else { return };
+    let Some(group) = frames[at].group else { return };
+    for below in (0..at).rev() {
+        let (old, new) = (&frames[below], &frames[at]);
+        let free = !busy.contains(&old.id) && old.foreign_to(new.requester).is_none();
+        // What lies between stays where it is.
+        if old.group == Some(group) && free && frames[below + 1..at].iter().all(|between| !shares(old, between)) {
+            frames[at] = Arc::new(taken_over(old, new));
+            frames.remove(below);
+            at -= 1;
+        }
+    }
+}
+
+/// A frame with what an older one did as well. What both have called is taken back once.
+fn taken_over(old: &Frame, new: &Frame) -> Frame {
+    let own = list(new);
+    let again = |item: &DraftStep| matches!(item.step, Step::Operation(_)) && own.iter().any(|o| o.step == item.step);
+    let rest: Vec<DraftStep> = list(old).into_iter().filter(|item| !again(item)).collect();
+    let old = Frame { inverse: Inverse::List(Arc::new(rest)), ..old.clone() };
+    let (group, scope, partial) = (new.group, new.scope, new.partial);
+    Frame { group, scope, partial, parts: Arc::default(), ..squash(&old, new) }
 }
 
 /// The frame of a safe configuration of which these steps were not done: it takes back what was.

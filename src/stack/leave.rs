@@ -4,6 +4,7 @@
 //! there who would take that away again. So it goes first, newest first, in one transaction with the undo that was asked for:
 //! both or none. What is `safe`, and what would move, is nobody's to take along.
 
+use super::claims::{Claim, Claims};
 use super::request::{Batch, LedDown, Request, Requester, Why};
 use super::share::{self, Hindrance};
 use super::{Frame, FrameId, Inverse, Stack, World};
@@ -29,11 +30,22 @@ fn outside(led: LedDown, frame: &Frame) -> Option<ComponentName> {
 }
 
 impl Stack {
-    /// Whether a batch may come to undo frames that its text does not name, while this is led down: then it has all of it.
-    pub fn goes_alone(&self, batch: &Batch, led: LedDown) -> bool {
-        let theirs = |frame: &Arc<Frame>| frame.requester == Requester::Operator && outside(led, frame).is_none();
+    /// What a batch claims beside what its text names, since its undos may take it along while this is led down: frames of operators that are
+    /// about what it is about, and those that are about what these are about. None: there are none.
+    pub fn taken_along(&self, batch: &Batch, led: LedDown, claims: &Claims) -> Option<Claim> {
         let own = |request: &Request| takes_along(request) && led.is_led_by(request.requester);
-        batch.requests.iter().any(own) && self.frames.iter().any(theirs)
+        let theirs = |frame: &&Arc<Frame>| frame.requester == Requester::Operator && outside(led, frame).is_none();
+        let mut open: Vec<Claim> = match batch.requests.iter().any(own) {
+            true => self.frames.iter().filter(theirs).map(|frame| claims.of_frame(frame)).collect(),
+            false => return None,
+        };
+        let (mut about, mut along) = (claims.of(&batch.requests), None);
+        while let Some(at) = open.iter().position(|frame| frame.meets(&about)) {
+            let frame = open.swap_remove(at);
+            about.join(&frame);
+            along.get_or_insert_with(Claim::default).join(&frame);
+        }
+        along
     }
 }
 

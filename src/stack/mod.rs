@@ -402,8 +402,16 @@ impl Stack {
     /// Pushes the frame of a safe configuration that has been applied as far as it goes, with what goes with it.
     pub fn push_safe(&mut self, edits: Edits, frame: Frame, busy: &[FrameId]) -> FrameId {
         let push = Some(Arc::new(Frame { safe: true, ..frame }));
-        let pushed = self.apply([&Edits { push, ..edits }], busy);
-        pushed.first().copied().unwrap_or(FrameId(0))
+        let pushed = self.apply([&Edits { push, ..edits }], busy).first().copied().unwrap_or(FrameId(0));
+        effort::take_over_group(&mut self.frames, pushed, busy);
+        pushed
+    }
+
+    /// How it will be when a safe configuration that is being applied has come to its end, whose frame has this number until then.
+    pub fn expecting(&self, edits: Edits, frame: Frame, id: FrameId) -> Self {
+        let mut expected = Self { next: id.0, ..self.clone() };
+        expected.push_safe(edits, frame, &[]);
+        expected
     }
 
     /// Pushes a frame as it is, but for its number.

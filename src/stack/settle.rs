@@ -157,7 +157,10 @@ impl World {
             Some(_) => without(frame, end.missed),
         };
         let verdict = if broken || end.left_out { Verdict::Broken } else { Verdict::Ok };
-        (self.stack.push_safe(edits, frame, busy), verdict)
+        // What is broken is repaired by the undo of its own frame.
+        let broken = self.broken.iter().filter_map(|broken| broken.frame);
+        let busy: Vec<FrameId> = busy.iter().copied().chain(broken).collect();
+        (self.stack.push_safe(edits, frame, &busy), verdict)
     }
 
     /// Frames that were to be undone with the state they belong to stay.

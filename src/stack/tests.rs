@@ -116,7 +116,7 @@ fn taken_up(
         operator: &FxHashSet::default(),
         joined,
         placed: false,
-        alone: None,
+        led: None,
         pushes,
     };
     take_up(world, requests, &rules)

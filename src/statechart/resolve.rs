@@ -62,9 +62,11 @@ impl ResolvedNames<'_> {
             pieces.remove(0);
         }
         let start = if text.starts_with('.') { scope } else { 0 };
-        let steps = pieces.iter().skip_while(|piece| **piece == ROOT);
+        // A state inside may be called like the outermost one.
+        let named = self.child(start, ROOT).is_some();
+        let outermost = pieces.iter().take_while(|piece| **piece == ROOT).count();
         let mut at = start;
-        for piece in steps {
+        for piece in &pieces[if named { outermost.min(1) } else { outermost }..] {
             at = self.child(at, piece).ok_or_else(|| self.missing(at, piece, text))?;
         }
         Ok(at)

@@ -173,6 +173,11 @@ pub fn touch_each(step: &Step, undo: Option<&Call>, before: &impl View, each: &m
             };
             let called = std::iter::once(of).chain(inverse.filter(|inverse| *inverse != of));
             called.for_each(|operation| each(Touch::new(Slot::Operation(operation), Access::Write)));
+            // What has moved is moved back by a component that is as it was: nothing takes its power away under it.
+            if let Some(inverse) = inverse.filter(|_| declared().is_some_and(|operation| operation.moves)) {
+                let (slot, serves) = (Slot::State(of.component), Some(Slot::Operation(inverse)));
+                each(Touch { slot, access: Access::Need, serves });
+            }
         }
     }
 }

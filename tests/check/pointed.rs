@@ -100,7 +100,7 @@ fn in_yaml_it_is_the_word_itself() {
         ("lift_coord.yaml", "[make, e", "[mkae, e", "coord::unknown_request", "mkae,", "`make`"),
         ("lift_coord.yaml", "e_built]", "e_biult]", "coord::unknown_request", "e_biult]", "`e_built`"),
         ("lift_coord.yaml", "entry: run.undo", "entry: run.udno", "coord::unknown_request", "run.udno", "`run.undo`"),
-        ("lift_coord.yaml", "[make.ok]", "[mkae.ok]", "coord::unknown_answer", "mkae.ok]", "`make`"),
+        ("lift_coord.yaml", "[make.ok]", "[mkae.ok]", "coord::unknown_answer", "mkae.ok]", "`make.ok`"),
     ];
     let mut wrong = Vec::new();
     for (file, from, to, code, wanted, hint) in rows {

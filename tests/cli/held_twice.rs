@@ -1,6 +1,6 @@
 //! What is safe stays in force where the state that has it is entered anew: an emergency that is heard twice lets nothing go.
 
-use crate::demo::Demo;
+use crate::demo::{Demo, at_home};
 
 const DEPLOYMENT: &str = "davit: 1
 name: twice
@@ -99,4 +99,87 @@ fn an_emergency_that_is_heard_again_lets_nothing_go() {
         let until = ran.out.find("shutting_down").unwrap_or(ran.out.len());
         assert!(!ran.out[since..until].contains("m.release\",\"outcome"), "{group} {held}: {}", ran.out);
     }
+}
+
+/// An emergency comes again while the first one is still being applied: one frame of its group is in force, and its undo lets all go.
+#[test]
+fn an_emergency_that_comes_while_it_is_being_heard_leaves_one_frame() {
+    let checked = at_home(&["check", "examples/conveyor/conveyor.yaml"]);
+    assert!(checked.code == 0 && !checked.err.contains('⚠'), "{}", checked.err);
+    let ran = at_home(&["run", "examples/conveyor/story.lua", "--clock", "simulated"]);
+    assert!(ran.code == 0 && ran.out.contains("oldest first: build run hold\n"), "{}{}", ran.out, ran.err);
+}
+
+/// Where nothing is there yet that it could hold, either.
+#[test]
+fn an_emergency_before_there_is_anything_leaves_one_frame() {
+    let demo = Demo::new();
+    demo.write("deployment.yaml", &DEPLOYMENT.replace("name: twice", "name: early"));
+    demo.write("c.yaml", &CONFIGURATIONS.replace("GROUP", "group: g,"));
+    demo.write("k.yaml", &COORDINATOR.replace("HELD", "config: hold"));
+    let script = "fault('create m', 'slow', 1, 3)
+        deploy('deployment.yaml', { replay = true })
+        raise('e_start')
+        wait(0.1)
+        for _ = 1, 4 do raise('e_estop') wait(0.1) end
+        local holds = 0
+        for _, frame in ipairs(stack()) do if frame.configuration == 'hold' then holds = holds + 1 end end
+        say('holds: ' .. holds)
+        wait(5)
+        shutdown()";
+    demo.write("early.lua", script);
+    let ran = demo.run(&["run", "early.lua", "--clock", "simulated"]);
+    assert!(ran.code == 0 && ran.out.contains("holds: 1\n"), "{}{}", ran.out, ran.err);
+}
+
+/// Two that are safe and of one group, each asked for while the other one is still being applied: one frame, and all is as that says.
+#[test]
+fn alternatives_that_are_safe_take_each_others_place_however_quickly_they_come() {
+    let demo = Demo::new();
+    for one in ["slow", "fast"] {
+        demo.replace(
+            "configurations.lua",
+            &format!("{one} = Configuration {{"),
+            &format!("{one} = Configuration {{ safe = true,"),
+        );
+    }
+    // `slow` changes one thing more, which `fast` leaves as it was.
+    demo.replace("configurations.lua", "port_write(\"sink.flag\", false)", "property_set(\"source.name\", \"slow\")");
+    let script = "fault('property_set source.k', 'slow', 9, 0.05)
+        deploy('deployment.yaml')
+        raise('e_fast') wait(1)
+        local function told(what)
+          local frames = {}
+          for _, frame in ipairs(stack()) do frames[#frames + 1] = frame.configuration end
+          say(what .. ': ' .. table.concat(frames, ' ') .. ' ' .. property('source.k') .. ' ' .. property('source.name'))
+        end
+        raise('e_slow') wait(0.01) raise('e_fast') wait(1) told('fast')
+        raise('e_slow') wait(0.01) raise('e_fast') wait(0.01) raise('e_slow') wait(1) told('slow')
+        raise('e_slow') wait(1)
+        shutdown()";
+    demo.write("quick.lua", script);
+    let ran = demo.run(&["run", "quick.lua", "--clock", "simulated"]);
+    let frames = "create_all connect_all start_all";
+    for said in [format!("fast: {frames} fast 9.0 first\n"), format!("slow: {frames} slow 1.0 slow\n")] {
+        assert!(ran.code == 0 && ran.out.contains(&said), "{said}: {}{}", ran.out, ran.err);
+    }
+}
+
+/// Of what was done of it in part, too: the undo of the one that stands takes all of it back.
+#[test]
+fn an_emergency_that_comes_twice_and_fails_in_part_is_taken_back_whole() {
+    let demo = Demo::new();
+    for file in ["conveyor.yaml", "configurations.yaml", "coordinator.yaml"] {
+        let text = std::fs::read_to_string(format!("{}/examples/conveyor/{file}", env!("CARGO_MANIFEST_DIR"))).unwrap();
+        demo.write(file, &text);
+    }
+    let script = "deploy('conveyor.yaml')
+        fault('operation_call belt.brake', 'slow', 9, 0.05) fault('port_write belt.speed = 0.0', 'fail', 1)
+        raise('e_stop') wait(0.02) raise('e_stop') wait(1)
+        raise('e_end') wait(2)
+        say('left: ' .. #stack())
+        shutdown()";
+    demo.write("part.lua", script);
+    let ran = demo.run(&["run", "part.lua", "--clock", "simulated"]);
+    assert!(ran.out.contains("hold.broken") && ran.out.contains("left: 0\n"), "{}{}", ran.out, ran.err);
 }

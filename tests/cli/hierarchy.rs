@@ -326,7 +326,7 @@ fn what_is_set_of_a_subsystem_is_told_by_its_whole_name() {
     let demo = cell();
     assert_eq!(demo.run(&["check", "cell.yaml", "--set", "duo.left.gain=0.5"]).code, 0);
     for (set, said, help) in [
-        ("duo.left.gian=1", "the parameter `duo.left.gian`", "did you mean `gain`?"),
+        ("duo.left.gian=1", "the parameter `duo.left.gian`", "did you mean `duo.left.gain`?"),
         ("dou.left.gain=1", "the parameter `dou`", "did you mean the subsystem `duo`?"),
         ("duo.lfet.gain=1", "the parameter `duo.lfet`", "did you mean the subsystem `left`?"),
         ("duo/left.gain=1", "`duo/left` is not a name", "given as `--set duo.left.gain`"),

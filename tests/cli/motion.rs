@@ -151,6 +151,18 @@ fn recover_leaves_alone_what_is_whole() {
         undo('lift') wait_answer('lift.undone', 1) recover('back') assert(#stack() == 1)");
 }
 
+/// What has moved is moved back by a component that runs as it did: nothing takes its power away under it.
+#[test]
+fn what_holds_something_up_is_not_stopped_under_it() {
+    let log =
+        run("for _, id in ipairs{'build', 'go', 'rise'} do apply(id, {force = true}) wait_answer(id .. '.ok', 1) end
+        undo('go', {force = true}) wait_answer('go.undo.failed', 1) assert_running('c')
+        undo('rise', {force = true}) wait_answer('rise.undone', 1)
+        undo('go', {force = true}) wait_answer('go.undone', 1) assert_state('c', 'stopped')
+        undo('build', {force = true}) wait_answer('build.undone', 1)");
+    assert!(log.contains("`go` cannot be undone before `rise`"), "{log}");
+}
+
 /// Requests of one connection begin one after the other, also where they have nothing to do with each other; a script is one.
 #[test]
 fn what_one_asks_for_begins_one_after_the_other() {

@@ -260,3 +260,38 @@ fn a_subsystem_is_not_down_before_what_is_inside_is() {
     let (inside, parent) = (at("in  a/b:root.off"), at("in  pair:root.idle"));
     assert!(inside.is_some() && inside < parent, "in its first life, too: {}{}", ran.out, ran.err);
 }
+
+/// Of a subsystem with several coordinators it is not known what it tells in which order. That nobody has ended it is.
+#[test]
+fn who_waits_for_down_of_what_nobody_has_ended_is_warned_of() {
+    let pair = pair();
+    let two = ROBOT.replace("coordinator: robot.lua", "coordinators: { m: robot.lua, k: k.lua }");
+    let two = two.replace("up: on", "up: [m:on, k:u]").replace("down: off", "down: [m:off, k:z]");
+    pair.write("robot.yaml", &two);
+    let begins = BOOTS.replace("boot = state {}, ", "").replace("tgt = \"boot\" }", "tgt = \"off\" }");
+    let lines = begins.lines().filter(|line| !line.contains("src = \"boot\""));
+    pair.write("robot.lua", &lines.collect::<Vec<_>>().join("\n"));
+    let second = r#"return state { z = state {}, u = state {}, trans { src = "initial", tgt = "z" },
+  trans { src = "z", tgt = "u", events = { "e_start" } }, trans { src = "u", tgt = "z", events = { "e_stop" } } }"#;
+    pair.write("k.lua", second);
+    pair.write("pair.yaml", &PAIR.replace(", right: { deployment: robot.yaml }", ""));
+    let alone = |unended: &str| {
+        let chart = r#"return state {
+  idle = state {}, w = state {}, on = state {}, l = state {},
+  trans { src = "initial", tgt = "idle" },
+  trans { src = "idle", tgt = "w", events = { "e_start" }, effect = "left/e_start" },
+  trans { src = "w", tgt = "on", events = { "left/up" } },
+  trans { src = "w", tgt = "l", events = { "e_stop" }, effect = "left/e_stop" },
+  trans { src = "on", tgt = "l", events = { "e_stop" }, effect = "left/e_stop" },
+  trans { src = "l", tgt = "idle", events = { "left/down" } },
+}"#;
+        pair.write("pair.lua", &chart.replace(unended, &unended.replace(r#", effect = "left/e_stop""#, "")));
+        pair.run(&["check", "pair.yaml"])
+    };
+    let led = alone("nothing of it");
+    assert!(!led.err.contains("no_way_down"), "{}", led.err);
+    let not_led = alone(r#"src = "w", tgt = "l", events = { "e_stop" }, effect = "left/e_stop" }"#);
+    let warned =
+        ["from `root.l` only `left/down` leads down, and nobody has ended `left` there", "raise `left/e_stop`"];
+    assert!(warned.iter().all(|words| not_led.err.contains(words)), "{}", not_led.err);
+}

@@ -194,6 +194,40 @@ fn a_slip_is_told_once_and_with_what_was_meant() {
     assert!(ran.code != 0 && !ran.err.contains("no Lua file reads"), "{}", ran.err);
 }
 
+/// What is wrong with the declaration of a parameter is told there, and nothing of the files that read it.
+#[test]
+fn a_parameter_that_is_declared_ill_is_not_called_missing_as_well() {
+    for (ill, said) in [
+        ("top: { type: float, default: half }", "the default is not allowed"),
+        ("top: { type: flot, default: 0.5 }", "`flot` is not a type"),
+        ("top: { type: float, default: 2.0, max: 1.0 }", "the default is not allowed"),
+    ] {
+        let demo = Demo::new();
+        demo.replace("deployment.yaml", "configurations:", &format!("parameters: {{ {ill} }}\nconfigurations:"));
+        demo.replace("configurations.lua", "property_set(\"source.k\", 9)", "property_set(\"source.k\", top)");
+        let ran = demo.run(&["check", "deployment.yaml"]);
+        assert!(ran.code == 1 && ran.err.contains(said) && ran.err.contains("1 error\n"), "{ill}: {}", ran.err);
+    }
+}
+
+#[test]
+fn a_slip_in_the_platform_of_a_parent_is_told_there_and_once() {
+    let demo = Demo::new();
+    let (robot, parent) = ("name: robot\nplatform: simulated", "name: pair\nplatform: simulatd");
+    let rest = "types: {}\nconfigurations: [none.yaml]\ncoordinator: rests.yaml\ndeploy: { event: e_start, up: on, \
+                within_s: 1 }\nshutdown: { event: e_stop, down: off, within_s: 1 }\n";
+    demo.write("robot.yaml", &format!("davit: 1\n{robot}\n{rest}"));
+    let two = "subsystems: { left: { deployment: robot.yaml }, right: { deployment: robot.yaml } }";
+    demo.write("pair.yaml", &format!("davit: 1\n{parent}\n{two}\n{rest}"));
+    demo.write("none.yaml", "configurations: {}\n");
+    let chart = "coordinator:\n  states: { off: {}, on: {} }\n  transitions:\n    - { src: initial, tgt: off }\n    \
+                 - { src: off, tgt: on, events: [e_start] }\n    - { src: on, tgt: off, events: [e_stop] }\n";
+    demo.write("rests.yaml", chart);
+    let ran = demo.run(&["check", "pair.yaml"]);
+    let there = ran.err.contains("pair.yaml:3:11") && ran.err.contains("`simulated` or `simulatd`?");
+    assert!(ran.code == 1 && there && ran.err.matches("compose::differs").count() == 1, "{}", ran.err);
+}
+
 #[test]
 fn a_parent_is_told_the_names_that_it_may_use() {
     let home = env!("CARGO_MANIFEST_DIR");

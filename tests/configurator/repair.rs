@@ -20,6 +20,16 @@ struct Watched {
     meanwhile: Meanwhile,
 }
 
+impl Watched {
+    fn meanwhile(&self) {
+        let meanwhile = self.meanwhile.lock().unwrap().take();
+        if let Some(meanwhile) = meanwhile {
+            meanwhile();
+            self.inner.clock().sleep(Duration::from_millis(300));
+        }
+    }
+}
+
 impl Platform for Watched {
     fn catalogue(&self) -> &Catalogue {
         self.inner.catalogue()
@@ -34,7 +44,9 @@ impl Platform for Watched {
         self.inner.cancel(step);
     }
     fn observe(&self, deadline: Time) -> Result<Snapshot, davit::platform::ObserveError> {
-        self.inner.observe(deadline)
+        let seen = self.inner.observe(deadline);
+        self.meanwhile();
+        seen
     }
     fn observe_component(
         &self,
@@ -49,11 +61,7 @@ impl Platform for Watched {
         deadline: Time,
     ) -> Result<Snapshot, davit::platform::ObserveError> {
         let seen = self.inner.observe_some(components, deadline);
-        let meanwhile = self.meanwhile.lock().unwrap().take();
-        if let Some(meanwhile) = meanwhile {
-            meanwhile();
-            self.inner.clock().sleep(Duration::from_millis(300));
-        }
+        self.meanwhile();
         seen
     }
     fn subscribe(&self, sink: davit::platform::EventSink) {
@@ -128,8 +136,12 @@ impl Bench {
     }
 
     fn recover(&self) -> Result<(), String> {
+        self.recover_by(Recovery::Back)
+    }
+
+    fn recover_by(&self, direction: Recovery) -> Result<(), String> {
         let deadline = self.rig.clock.now() + Duration::from_secs(20);
-        let recovered = self.rig.handle.recover(Recovery::Back, deadline).expect("an answer");
+        let recovered = self.rig.handle.recover(direction, deadline).expect("an answer");
         recovered.map_err(|residual| residual.to_string())
     }
 
@@ -157,6 +169,21 @@ fn a_safe_configuration_that_comes_while_it_is_looked_keeps_everything_still() {
     assert_eq!(bench.rig.ask_as("nine.undo", coordinator("c2")), ["nine.undone"]);
     assert_eq!(bench.recover(), Ok(()));
     assert_eq!(bench.done(), ["property_set B.k = 0.0", "start A"]);
+    bench.rig.in_step();
+}
+
+/// Who takes what is there as the state does not know of what has come while it was looked: that stays in force, and is in the model.
+#[test]
+fn a_safe_configuration_that_comes_while_what_is_there_is_accepted_stays_in_force() {
+    let bench = Bench::new();
+    bench.tamper(&[set("A.k", 5.0)]);
+    bench.comes("nine");
+    let why = bench.recover_by(Recovery::Accept).expect_err("it came meanwhile");
+    assert!(why.contains("`nine`"), "{why}");
+    let frames: Vec<_> = bench.rig.view().stack.iter().map(|frame| frame.configuration).collect();
+    assert!(frames.contains(&id("nine")), "{frames:?}");
+    assert_eq!(bench.recover_by(Recovery::Accept), Ok(()));
+    assert!(bench.rig.view().stack.is_empty(), "asked for once more it is given up");
     bench.rig.in_step();
 }
 

@@ -216,6 +216,27 @@ fn files_are_refused_by_size_and_encoding() {
     assert_eq!(directory.findings[0].code.0, "text::unreadable");
 }
 
+/// A bit of each is kept: more than there are bits are not followed as if they were fewer.
+#[test]
+fn a_deployment_has_so_many_coordinators() {
+    let folder = tempfile::tempdir().unwrap();
+    let chart = "coordinator: { states: { off: {} }, transitions: [{ src: initial, tgt: off }] }\n";
+    std::fs::write(folder.path().join("k.yaml"), chart).unwrap();
+    let loaded = |n: usize| {
+        let all: Vec<String> = (0..n).map(|i| format!("k{i}: k.yaml")).collect();
+        let text = format!(
+            "davit: 1\nname: many\nplatform: simulated\ntypes: {{}}\nconfigurations: []\ncoordinators: {{ {} }}\n\
+             deploy: {{ event: e_start, up: off, within_s: 1 }}\nshutdown: {{ event: e_end, down: off, within_s: 1 }}\n",
+            all.join(", ")
+        );
+        let file = folder.path().join("many.yaml");
+        std::fs::write(&file, text).unwrap();
+        let findings = lang::load(&file, &LoadOptions::default()).findings;
+        findings.into_iter().filter(|finding| finding.code.0 == "text::too_large").count()
+    };
+    assert_eq!((loaded(60), loaded(61)), (0, 1));
+}
+
 #[test]
 fn values_are_finite() {
     for value in ["0/0", "1/0", "-math.huge", "{ 1.0, 0/0 }"] {

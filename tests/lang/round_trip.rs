@@ -450,7 +450,7 @@ fn deployment() -> impl Strategy<Value = Deployment> {
     let may = prop_oneof![config_id().prop_map(OperatorMay::Apply), member().prop_map(OperatorMay::Set)];
     let watched = (btree_set(event(), 0..3).prop_map(placed), btree_set(may, 0..3).prop_map(placed));
     let ends = (vec(reaction, 0..3), vec(fault, 0..3), watched, btree_map(ident(), value(), 0..3));
-    let parts = (types, btree_map(ident(), activity, 0..3), vec(event(), 0..3), up, down, limits, ends);
+    let parts = (types, btree_map(ident(), activity, 0..3), btree_set(event(), 0..3), up, down, limits, ends);
     let coordinator = (option::of(ident()), chart(), path(), vec(path(), 0..3), path());
     let coordinators = vec(coordinator, 1..4);
     (vec(ident(), 2..5), configurations(), coordinators, monitors(), parts).prop_map(

@@ -70,6 +70,7 @@ fn deployment_keys_names_and_values() {
         ("coordinator: k.lua", "coordinator: kk.lua", "text::no_file 16:14", "`k.lua`"),
         ("coordinator: k.lua", "coordinator: c.lua", "text::nothing 1:1", "return state"),
         ("emits: [e_ready]", "emits: [e ready]", "text::bad_name 17:9", "blanks"),
+        ("emits: [e_ready]", "emits: [e_ready, e_ready]", "text::duplicate_key 17:18", "once"),
         ("event: e_start", "evnt: e_start", "text::unknown_key 18:11", "`event`"),
         ("up: operational", "up: opera-tional", "text::bad_name 18:31", "operational"),
         ("within_s: 20 }\nshut", "within_s: 20s }\nshut", "text::bad_time 18:71", "within_s: 20"),

@@ -127,7 +127,7 @@ pub fn run(seed: u64, made: &Made, chance: &mut Chance, classes: &mut Classes) -
                     Note::Requested { request: request.unwrap_or_default(), by: by.clone(), ask: ask.clone() }
                 }
                 Happening::State { active } => Note::Moved(active.clone()),
-                Happening::Forced { note } if note.contains("configurator itself") => Note::Failed(note.clone()),
+                Happening::Noted { note } if note.contains("configurator itself") => Note::Failed(note.clone()),
                 _ => return,
             };
             notes.lock().unwrap_or_else(PoisonError::into_inner).push((at, note));

@@ -241,7 +241,7 @@ fn what_an_answer_tells_comes_from_nobody_else() {
         crowd.session.raise(event(name), "test");
     }
     let log = crowd.session.hub().log(usize::MAX);
-    let noted = |what: &Happening| matches!(what, Happening::Forced { note } if note.contains("`ask.ok` is an answer"));
+    let noted = |what: &Happening| matches!(what, Happening::Noted { note } if note.contains("`ask.ok` is an answer"));
     assert!(log.iter().any(|entry| noted(&entry.what)), "{log:?}");
     crowd.session.raise(event("e_begin"), "test");
     crowd.until("the first word", || heard.load(Ordering::SeqCst) > 0);

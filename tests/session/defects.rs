@@ -19,7 +19,7 @@ fn panics_at(small: &Small, what: impl Fn(&Happening) -> bool + Send + Sync + 's
 
 fn told(small: &Small, text: &str) -> bool {
     let log = small.session.hub().log(usize::MAX);
-    log.iter().any(|entry| matches!(&entry.what, Happening::Forced { note } if note.contains(text)))
+    log.iter().any(|entry| matches!(&entry.what, Happening::Noted { note } if note.contains(text)))
 }
 
 /// What drives it panics once it is up: its coordinator leads down all the same, and then the panic goes on.

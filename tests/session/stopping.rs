@@ -356,7 +356,7 @@ fn an_emergency_on_the_way_down_stops_the_time() {
     small.after(1.0, |session| session.raise(event("e_estop"), "test"));
     // Whoever looks at the terminal is told before the time of the stage would be over.
     small.after(4.0, |session| {
-        let told = |entry: &&Arc<LogEntry>| matches!(&entry.what, Happening::Forced { note } if note.contains("nothing goes on before"));
+        let told = |entry: &&Arc<LogEntry>| matches!(&entry.what, Happening::Noted { note } if note.contains("nothing goes on before"));
         assert_eq!(session.hub().log(usize::MAX).iter().filter(told).count(), 1);
     });
     small.after(60.0, |session| {
@@ -421,7 +421,7 @@ fn an_emergency_on_the_way_up_stops_the_time() {
     assert!(took >= 60.0 && not_up.interrupted, "{took}: {not_up:?}");
     let log = small.session.hub().log(usize::MAX);
     let told = log.iter().filter(
-        |entry| matches!(&entry.what, Happening::Forced { note } if note.starts_with("not up after 20 s, and a safe")),
+        |entry| matches!(&entry.what, Happening::Noted { note } if note.starts_with("not up after 20 s, and a safe")),
     );
     assert_eq!(told.count(), 1, "who waits for it to come up is told why it does not");
     let calls = small.steps().iter().filter(|step| step.contains("a.raise")).count();
@@ -558,7 +558,7 @@ fn who_sends_a_safety_event_that_acts_by_itself_is_told() {
     });
     assert_eq!(by.as_deref(), Some("a safety event"));
     let delivered =
-        log.iter().any(|entry| matches!(&entry.what, Happening::Forced { note } if note.contains("was not delivered")));
+        log.iter().any(|entry| matches!(&entry.what, Happening::Noted { note } if note.contains("was not delivered")));
     assert!(!delivered, "it did what it is for");
 }
 

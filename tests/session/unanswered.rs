@@ -150,7 +150,7 @@ fn where_nobody_knows_whether_it_is_held_people_decide() {
     assert!(took >= 60.0, "{took}: {ended:?}");
     let log = small.session.hub().log(usize::MAX);
     let notes = log.iter().filter_map(|entry| match &entry.what {
-        Happening::Forced { note } => Some(note.as_str()),
+        Happening::Forced { note } | Happening::Noted { note } => Some(note.as_str()),
         _ => None,
     });
     let held = "whether a safe configuration is in force is not known: what is left stays as it is";

@@ -209,6 +209,70 @@ fn what_would_be_decided_otherwise_is_a_warning() {
     );
 }
 
+/// What SCXML does not have, or has otherwise, is never passed over.
+#[test]
+fn what_is_no_word_of_scxml_is_told() {
+    let of_a = |inside: &str| document(&format!("<state id=\"a\">{inside}</state><state id=\"b\"/>"));
+    let to_b = "<transition event=\"s\" target=\"b\"/>";
+    let sent = "<send event=\"s\" id=\"i\" delay=\"1s\"/>";
+    let on_exit = "<onexit><cancel sendid=\"i\"/></onexit>";
+    for (inside, words) in [
+        ("<transition evnt=\"s\" target=\"b\"/>".to_owned(), "`transition` has no attribute `evnt`"),
+        ("<transition event=\"s\" type=\"bogus\" target=\"b\"/>".to_owned(), "`bogus` is no type"),
+        ("<transition event=\"e_done\" target=\"b\"/>".to_owned(), "`e_done` is no name of an event"),
+        ("<transition event=\"e_after(1)\" target=\"b\"/>".to_owned(), "`e_after(1)` is no name of an event"),
+        ("hello".to_owned(), "text in `state` means nothing: `hello`"),
+        (
+            "<onentry><send event=\"s\" target=\"#_parent\" namelist=\"v\"/></onentry>".to_owned(),
+            "`namelist` of `send`",
+        ),
+        ("<onentry><x:do xmlns:x=\"urn:x\"/></onentry>".to_owned(), "`do` is of another language (`urn:x`)"),
+        (
+            "<i:include xmlns:i=\"http://www.w3.org/2001/XInclude\" href=\"x\"/>".to_owned(),
+            "brings in another document",
+        ),
+        (format!("<onentry>{sent}</onentry>{to_b}"), "comes in SCXML also when this state was left"),
+        (format!("<onentry>{sent}<cancel sendid=\"i\"/></onentry>{on_exit}{to_b}"), "taken back at once"),
+        (format!("<onexit>{sent}</onexit>{to_b}"), "`s` is sent later when the state is left"),
+        (
+            format!("<onentry>{}</onentry>{on_exit}{to_b}", sent.replace("id=", "target=\"#_parent\" id=")),
+            "`s` is sent later to the outside",
+        ),
+    ] {
+        let found = findings(&of_a(&inside));
+        assert!(matches!(&found[..], [one] if one.contains(words)), "{inside}: {found:?}");
+    }
+    assert_eq!(findings(&of_a(&format!("<onentry>{sent}</onentry>{on_exit}{to_b}"))), Vec::<String>::new());
+    // Notes of editors are nothing that the chart does.
+    assert_eq!(findings(&of_a("<q:place xmlns:q=\"urn:q\" q:x=\"1\"/>")), Vec::<String>::new());
+    let eventless = document(
+        "<state id=\"a\"><transition target=\"b\"/>\n<state id=\"c\"><transition target=\"d\"/></state></state>\
+         <state id=\"b\"/><state id=\"d\"/>",
+    );
+    let found = findings(&eventless);
+    assert!(matches!(&found[..], [one] if one.starts_with("warning scxml::priority 3:15")), "{found:?}");
+}
+
+/// `root` is the name of the outermost state here, and nobody's in SCXML.
+#[test]
+fn a_state_may_be_called_root() {
+    let inside =
+        "<state id=\"root\"><state id=\"b\"><transition event=\"go\" target=\"c\"/></state><state id=\"c\"/></state>";
+    let foreign = document(inside).replace(" initial=\"a\"", " initial=\"root\"");
+    assert_eq!(findings(&foreign), Vec::<String>::new());
+    let chart = read(&foreign);
+    let compiled = compile(&chart).0.unwrap();
+    let mut sim = Sim::new(&compiled);
+    assert_eq!(sim.line("run").unwrap().active.last().unwrap(), "root.root.b");
+    assert_eq!(sim.line("go").unwrap().active.last().unwrap(), "root.root.c");
+    // What was written of it comes back.
+    let written = print::coordinator(&chart, Language::Scxml);
+    let again = compile(&read(&written)).0.unwrap();
+    let mut sim = Sim::new(&again);
+    sim.line("run").unwrap();
+    assert_eq!(sim.line("go").unwrap().active.last().unwrap(), "root.root.c");
+}
+
 /// Where a foreign document stands after each line, and what was done.
 fn play(body: &str, lines: &[&str]) -> Vec<(String, Vec<String>)> {
     let (chart, findings) = compile(&read(&document(body)));

@@ -321,6 +321,10 @@ fn all_of_it(name: &str, friction: f64, mass: f64) {
     let (step, at) = jolt(&all);
     println!("{name}, friction {friction}, mass {mass}: {step:.2} N m in 1 ms at most, at {at:.3} s");
     assert!(all[0].mode != 6 && step < 0.5, "{step} N m in 1 ms at {at} s\n{}", live.story(at - 0.1));
+    // What is left when the driver stops is gone at once: it is stopped when the torque has faded.
+    let done = |what: &str| live.first(what, 0.0).unwrap_or_else(|| panic!("{what}"));
+    let faded = done("stop_all.ok") - done("stop_control.ok");
+    assert!(faded > 0.004, "stopped {faded} s after the control loop, from up to 2 N m");
     assert_eq!(live.first("e_arm_dropped", 0.0), None);
     live.clock.shutdown();
 }

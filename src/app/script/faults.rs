@@ -90,6 +90,11 @@ impl ScriptFaults {
         ports.filter(|(_, port)| port.direction == Direction::In).map(|(name, _)| *name).collect()
     }
 
+    /// Whether the components of the deployment that is up are imitated, and do nothing by themselves.
+    pub(super) fn imitated(&self) -> bool {
+        self.up.as_ref().is_some_and(|(checked, _)| checked.deployment.kind.imitates)
+    }
+
     /// The components that configurations of the deployment that is up create, each with its type, or types.
     pub(super) fn created(&self) -> Vec<(ComponentName, Arc<ComponentType>)> {
         let Some((checked, _)) = &self.up else { return Vec::new() };

@@ -205,6 +205,10 @@ fn known(host: &SharedHost, component: &str, what: &str, given: &[(String, Value
         let help = did_you_mean(component, "components", known);
         return Err(error(format!("no configuration creates a component `{component}`: {help}")));
     }
+    if host.faults.imitated() {
+        let instead = format!("`fault(\"start {component}\", \"fail\")` lets a step of it go wrong");
+        return Err(error(format!("nothing can be injected into components on this platform: {instead}")));
+    }
     let mut wrong: Option<NoInjection> = None;
     for (name, ty) in of {
         match Injection::of(ty, what, given) {

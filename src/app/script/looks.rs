@@ -19,7 +19,7 @@ pub(super) fn component_state(host: &SharedHost, name: &str) -> mlua::Result<Opt
 }
 
 pub(super) fn assert_state(host: &SharedHost, name: &str, wanted: &str) -> mlua::Result<()> {
-    let known = || did_you_mean(wanted, "run states", RunState::NAMES.iter().copied());
+    let known = || did_you_mean(wanted, "run states", RunState::NAMES.iter().copied().chain(["faulted"]));
     let wanted =
         RunState::from_name(wanted).ok_or_else(|| error(format!("`{wanted}` is no run state: {}", known())))?;
     match component_state(host, name)? {

@@ -266,8 +266,8 @@ modules.ext = function()
           if own then own(machine, events) end
           if #events == 0 then return end
           for _, name in ipairs(order) do rfsm.send_events(subs[name], table.unpack(events)) end
-          for _, name in ipairs(order) do rfsm.step(subs[name]) end
         end
+        for _, name in ipairs(order) do advance(subs[name]) end
       end,
       doo = function()
         while true do

@@ -76,6 +76,9 @@ function rfsm.is_composite(o) return is_composite(o) end
 function rfsm.is_leaf(o) return kind(o) == "state" and not is_composite(o) end
 function rfsm.is_root(o) return kind(o) == "state" and rawget(o, "_parent") == o end
 function rfsm.is_nr_state(o) return kind(o) == "state" and not rfsm.is_root(o) end
+function rfsm.is_nr_node(o) return rfsm.is_node(o) and not rfsm.is_root(o) end
+function rfsm.is_fsmobj(o) return kind(o) ~= nil end
+function rfsm.is_meta(key) return string.sub(key, 1, 1) == "_" end
 function rfsm.is_initialized_root(o) return rfsm.is_root(o) and rawget(o, "_initialized") == true end
 rfsm.is_sta, rfsm.is_csta, rfsm.is_sista, rfsm.is_connector = rfsm.is_state, is_composite, rfsm.is_leaf, rfsm.is_conn
 rfsm.is_nr_sista = function(o) return rfsm.is_leaf(o) and not rfsm.is_root(o) end
@@ -420,7 +423,7 @@ function rfsm.get_active_conf(fsm) return native.active(fsm) end
 function rfsm.get_sta_mode(state) return native.mode(state) end
 function rfsm.actchild_get(state) return native.active_child(state) end
 
--- `f(object, scope, name)` for every object inside `fsm` that `pred` accepts; the results in a list.
+-- `f(object, scope, name)` for `fsm`, where that is a root, and every object inside that `pred` accepts; the results in a list.
 function rfsm.mapfsm(f, fsm, pred, depth)
   local results = {}
   local function go(state, level)
@@ -430,6 +433,7 @@ function rfsm.mapfsm(f, fsm, pred, depth)
       if part.kind == "state" then go(part.value, level - 1) end
     end
   end
+  if rfsm.is_root(fsm) and (not pred or pred(fsm)) then results[1] = f(fsm, fsm, "root") end
   go(fsm, depth or MOST_LEVELS)
   return results
 end

@@ -46,6 +46,8 @@ pub struct Draft {
     pub operator: Vec<(OperatorMay, Origin)>,
     /// `parameters`, `exports`, `accepts`, `leaving`
     pub interface: Interface,
+    /// Parameters that are not declared in order, which is said.
+    pub ill: Vec<Ident>,
     /// `subsystems`
     pub subsystems: Vec<SubsystemDraft>,
     /// `deploy`
@@ -163,10 +165,10 @@ pub fn draft(cx: &mut Cx, node: Node, file_name: &str) -> Option<Draft> {
     }
     let host = files(cx, &mut fields, "host");
     let with = fields.entries(cx, "with");
-    let emits = emits(cx, &mut fields);
+    let emits = names(cx, &mut fields, "emits", "`emits`");
     let safety = names(cx, &mut fields, "safety", "`safety`");
     let operator = operator(cx, &mut fields);
-    let interface = interface::interface(cx, &mut fields);
+    let (interface, ill) = interface::interface(cx, &mut fields);
     let subsystems = interface::subsystems(cx, &mut fields);
     let deploy = fields.take(cx, "deploy").and_then(|node| beside::rise(cx, node));
     let shutdown = fields.take(cx, "shutdown").and_then(|node| beside::fall(cx, node));
@@ -195,6 +197,7 @@ pub fn draft(cx: &mut Cx, node: Node, file_name: &str) -> Option<Draft> {
         safety,
         operator,
         interface,
+        ill,
         subsystems,
         deploy,
         shutdown,
@@ -272,12 +275,6 @@ fn trusted(cx: &mut Cx, node: Node) -> Option<Openings> {
     }
     fields.finish(cx);
     Some(out)
-}
-
-fn emits(cx: &mut Cx, fields: &mut Fields) -> Vec<(EventName, Origin)> {
-    let nodes = fields.several(cx, "emits");
-    let example = fields.row("emits").example;
-    nodes.iter().filter_map(|node| Some((name(cx, node, "an emitted event", example)?, node.origin))).collect()
 }
 
 /// `operator`: configurations, and properties and in-ports as `Component.member`.

@@ -27,20 +27,29 @@ pub struct SubsystemDraft {
     pub origin: Origin,
 }
 
-/// `parameters`, `exports`, `accepts` and `leaving`.
-pub fn interface(cx: &mut Cx, fields: &mut Fields) -> Interface {
+/// `parameters`, `exports`, `accepts` and `leaving`; and the parameters that are not declared in order, which is said.
+pub fn interface(cx: &mut Cx, fields: &mut Fields) -> (Interface, Vec<Ident>) {
+    let mut ill = Vec::new();
     let mut interface = Interface { accepts: super::names(cx, fields, "accepts", "`accepts`"), ..Interface::default() };
     let example = fields.row("parameters").example;
     if let Some(node) = fields.take(cx, "parameters") {
         for (name, entry) in named(cx, node, "`parameters`", example) {
-            interface.parameters.extend(parameter(cx, entry).map(|parameter| (name, parameter)));
+            match parameter(cx, entry) {
+                Ok(parameter) => {
+                    interface.parameters.insert(name, parameter);
+                }
+                Err(declared) => {
+                    ill.push(name);
+                    interface.parameters.extend(declared.map(|parameter| (name, parameter)));
+                }
+            }
         }
     }
     if let Some(node) = fields.take(cx, "exports") {
         exports(cx, node, &mut interface);
     }
     interface.leaving = fields.take(cx, "leaving").and_then(|node| leaving(cx, node));
-    interface
+    (interface, ill)
 }
 
 /// A table of things by plain names.
@@ -49,17 +58,22 @@ fn named(cx: &mut Cx, node: Node, what: &str, example: &str) -> Vec<(Ident, Entr
     by_name(cx, entries, what, example, |_, _, entry| Some(entry))
 }
 
-fn parameter(cx: &mut Cx, entry: Entry) -> Option<PropertyType> {
-    let mut fields = Fields::of(cx, entry.value, &PARAMETER)?;
+/// A parameter, if it is declared in order; else what is known of it.
+fn parameter(cx: &mut Cx, entry: Entry) -> Result<PropertyType, Option<PropertyType>> {
+    let mut fields = Fields::of(cx, entry.value, &PARAMETER).ok_or(None)?;
     let ty = fields.take(cx, "type").and_then(|node| value_type(cx, node));
     let default = fields.take(cx, "default");
     let (min, max) = (fields.number(cx, "min"), fields.number(cx, "max"));
     let unit = fields.text(cx, "unit").map(Arc::from);
     let doc = fields.text(cx, "doc").unwrap_or_default();
     fields.finish(cx);
-    let (ty, origin) = (ty?, entry.origin);
+    let (ty, origin) = (ty.ok_or(None)?, entry.origin);
     let given = PropertyType { ty, default: None, min, max, tunable: Tunable::default(), unit, doc, origin };
-    Some(fitting(cx, given, default, "a parameter"))
+    let has_default = default.is_some();
+    let parameter = fitting(cx, given, default, "a parameter");
+    let none_fits =
+        parameter.ty == ValueType::Event || parameter.min.zip(parameter.max).is_some_and(|(min, max)| min > max);
+    if none_fits || has_default && parameter.default.is_none() { Err(Some(parameter)) } else { Ok(parameter) }
 }
 
 fn exports(cx: &mut Cx, node: Node, interface: &mut Interface) {
@@ -121,17 +135,21 @@ fn subsystem(cx: &mut Cx, own: Ident, entry: Entry) -> Option<SubsystemDraft> {
     Some(SubsystemDraft { name: own, file: file?, named_at, parameters, activities, origin: entry.origin })
 }
 
-/// Values of parameters as the Lua files read them: those that are given, and the defaults of the others. For messages: who gives them
-/// (`of`), and what stands before their names on the command line.
+/// Values of parameters as the Lua files read them: those that are given, and the defaults of the others (of an `ill` one, which is not
+/// declared in order, nothing is known). For messages: who gives them (`of`), and what stands before their names on the command line.
 pub fn given(
     cx: &mut Cx,
-    declared: &BTreeMap<Ident, PropertyType>,
+    (declared, ill): (&BTreeMap<Ident, PropertyType>, &[Ident]),
     mut given: Vec<Entry>,
     (of, within): (&str, &str),
     at: Origin,
 ) -> Vec<Entry> {
     let mut values = Vec::new();
-    for (name, parameter) in declared {
+    for name in ill {
+        given.retain(|entry| entry.key != name.as_str());
+        values.push(lost(*name, at));
+    }
+    for (name, parameter) in declared.iter().filter(|(name, _)| !ill.contains(name)) {
         let node = given.iter().position(|entry| entry.key == name.as_str()).map(|place| given.remove(place));
         let Some(entry) = node else {
             if let Some(default) = &parameter.default {

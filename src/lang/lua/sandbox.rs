@@ -250,6 +250,9 @@ pub fn undefined(lua: &Lua, shared: &SharedRecorder, table: &Table, prefix: &str
             known.extend(k.as_string().map(mlua::LuaString::to_string_lossy));
             Ok(())
         })?;
+        // Who means a value does not mean a function of Lua that happens to be spelt a little like it.
+        let far = |k: &String| prefix.is_empty() && BASE.contains(&k.as_str()) && k.chars().next() != name.chars().next();
+        known.retain(|k| !far(k));
         known.sort();
         let mut recorder = recorder.borrow_mut();
         known.extend(recorder.params.all.iter().map(|p| p.name.clone()).filter(|_| prefix.is_empty()));

@@ -125,8 +125,17 @@ impl<'t> ScxmlReader<'_, 't> {
             let transitions = child.children().filter(|c| c.has_tag_name((SCXML, "transition")));
             let mut own: Vec<String> = Vec::new();
             for transition in transitions {
+                if transition.attribute("event").is_none() {
+                    if around.iter().flatten().any(String::is_empty) {
+                        let message = "here and in a state around a transition needs no event: here the outer one wins, in SCXML \
+                                       the inner one";
+                        let help = "let one of the two wait for an event";
+                        self.warn(transition, codes::SCXML_PRIORITY, message.to_owned(), help);
+                    }
+                    own.push(String::new());
+                }
                 for event in transition.attribute("event").unwrap_or_default().split_whitespace() {
-                    let both = around.iter().flatten().any(|outer| overlap(outer, event));
+                    let both = around.iter().flatten().any(|outer| !outer.is_empty() && overlap(outer, event));
                     if both {
                         let message = format!(
                             "`{event}` is waited for here and in a state around: here the outer one wins, in SCXML the inner one"

@@ -7,6 +7,7 @@
 mod content;
 mod meaning;
 mod places;
+mod strange;
 mod transition;
 
 use super::print::scxml::{OURS, SCXML};
@@ -141,10 +142,13 @@ impl<'t> ScxmlReader<'_, 't> {
             root.children().find(|child| child.has_tag_name((SCXML, "state")) && child.attribute("id") == Some(ROOT));
         // Ours has the root as a state; others begin with what is in it.
         let top = outermost.filter(|_| self.ours).unwrap_or(root);
-        self.ids.insert(ROOT.to_owned(), ROOT.to_owned());
+        if self.ours {
+            self.ids.insert(ROOT.to_owned(), ROOT.to_owned());
+        }
         self.name_all(top, ROOT);
         if !self.ours {
             self.names = EventNames::of(root);
+            self.strange(root);
         }
         let mut state = self.state(top, ROOT, Ident::new(ROOT).ok()?);
         if top != root {
@@ -214,6 +218,7 @@ impl<'t> ScxmlReader<'_, 't> {
                 state.exit.extend(self.actions(child).0);
             }
         }
+        self.sent_later(element);
         for id in own(element, "config").unwrap_or_default().split_whitespace() {
             match ConfigId::new(id) {
                 Ok(id) => state.config.push((id, state.origin)),

@@ -82,6 +82,9 @@ impl<'t> ScxmlReader<'_, 't> {
         let exact = own(element, "event").is_some();
         let mut known = FxHashSet::default();
         for event in events.split_whitespace().filter(|event| *event != "*") {
+            if self.is_taken(element, event) {
+                return None;
+            }
             if exact || self.ours || delays.contains_key(event) {
                 self.trigger(element, event, exact, delays, &mut known, &mut out);
                 continue;

@@ -239,6 +239,11 @@ impl Drives {
         Ok(())
     }
 
+    /// Whether they are off, and a torque is left that fades.
+    pub fn fades(&self) -> bool {
+        self.mode == DriveMode::MotorStop && self.torque != J5::zeros()
+    }
+
     /// They take torques as they were meant to, after they held by themselves.
     ///
     /// # Errors

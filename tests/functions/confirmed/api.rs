@@ -6,7 +6,7 @@ use crate::lab::run;
 fn maps_and_names() {
     run("local fsm = init(S { a = S { x = S {}, T { src='initial', tgt='x' } }, T { src='initial', tgt='a' } })
          local all = rfsm.mapfsm(function(o, scope, name) return rfsm.fsmobj_tochar(o) end, fsm) table.sort(all)
-         eq(all, {'CS', 'LS', 'TR', 'TR', 'c', 'c'})
+         eq(all, {'CS', 'CS', 'LS', 'TR', 'TR', 'c', 'c'})
          eq(rfsm.map_from_to(fsm, function(f, s) return s._fqn end, fsm.a.x, fsm), {'root.a.x', 'root.a', 'root'})
          rfsm.run(fsm) eq(rfsm.actchild_get(fsm), fsm.a) eq(rfsm.actchild_get(fsm.a), fsm.a.x)
          assert(rfsm.is_leaf(fsm.a.x) and rfsm.is_composite(fsm.a) and rfsm.is_conn(fsm.initial) and rfsm.is_root(fsm))");
@@ -24,9 +24,9 @@ fn mapfsm_goes_from_the_outside_in_with_object_scope_and_name() {
     run("local fsm = init(S { a = S { x = S {}, T { src='initial', tgt='x' } }, T { src='initial', tgt='a' } })
          local seen = {} local function note(o, scope, name) seen[#seen + 1] = scope._fqn .. '/' .. tostring(name) return o end
          local all = rfsm.mapfsm(note, fsm, rfsm.is_node) table.sort(seen)
-         eq(seen, { 'root.a/initial', 'root.a/x', 'root/a', 'root/initial' }) eq(#all, 4)
-         local at = {} rfsm.mapfsm(function(o) at[#at + 1] = o._id end, fsm, rfsm.is_state) eq(at, {'a', 'x'}, 'a state before what is in it')
-         seen = {} rfsm.mapfsm(note, fsm, rfsm.is_node, 1) table.sort(seen) eq(seen, { 'root/a', 'root/initial' }, 'one level')
+         eq(seen, { 'root.a/initial', 'root.a/x', 'root/a', 'root/initial', 'root/root' }) eq(#all, 5)
+         local at = {} rfsm.mapfsm(function(o) at[#at + 1] = o._id end, fsm, rfsm.is_state) eq(at, {'root', 'a', 'x'}, 'a state before what is in it')
+         seen = {} rfsm.mapfsm(note, fsm, rfsm.is_node, 1) table.sort(seen) eq(seen, { 'root/a', 'root/initial', 'root/root' }, 'one level')
          eq(#rfsm.mapfsm(note, fsm, rfsm.is_trans), 2)");
 }
 

@@ -40,7 +40,7 @@ fn free_fields_and_names_with_an_underscore_are_no_parts() {
          rfsm.run(fsm) eq(leaf(fsm), 'root.a') eq(fsm.a.note, 'x')
          local n = 0 rfsm.post_step_hook_add(fsm, function() n = n + 1 end)
          rfsm.send_events(fsm, 'e') eq(rfsm.step(fsm), false, 'a transition under a name is one') eq(n, 1)
-         eq(#rfsm.mapfsm(function(o, s, name) return name end, fsm), 4)");
+         eq(#rfsm.mapfsm(function(o, s, name) return name end, fsm), 5)");
 }
 
 #[test]

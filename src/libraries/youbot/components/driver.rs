@@ -78,6 +78,8 @@ pub struct Driver {
     arm_is_there: bool,
     /// For how long a calibration has waited for the arm, in s.
     waits_for_arm: Option<f64>,
+    /// The drives were told to be off, and what is left of their torque fades.
+    goes_off: bool,
     motors: MotorStates,
     bus: DriverState,
     task: Option<Ticket>,
@@ -117,12 +119,12 @@ impl Component for Driver {
                 c.plant = state;
             }
             c.running = true;
-            (c.unwatched, c.unheard, c.waits_for_arm) = (None, None, None);
+            (c.unwatched, c.unheard, c.waits_for_arm, c.goes_off) = (None, None, None, false);
             Ok(())
         })
         .on_stop(|c, _| {
             c.running = false;
-            (c.task, c.waits_for_arm) = (None, None);
+            (c.task, c.waits_for_arm, c.goes_off) = (None, None, false);
             if !c.drives.switch_off() {
                 c.events.raise(c.names.dropped);
             }
@@ -218,6 +220,7 @@ impl Component for Driver {
             running: false,
             arm_is_there: false,
             waits_for_arm: None,
+            goes_off: false,
             motors: MotorStates::default(),
             bus: DriverState::default(),
             task: None,
@@ -292,6 +295,15 @@ impl Component for Driver {
                 }
             }
         });
+        if self.goes_off && (driven.braked || self.drives.mode() != DriveMode::MotorStop) {
+            self.goes_off = false;
+            if let Some(ticket) = self.task.take() {
+                match driven.braked {
+                    true => ticket.done(()),
+                    false => ticket.failed("the drives were told otherwise meanwhile"),
+                }
+            }
+        }
         if !self.heat_limit.get() {
             self.heat = HeatLimit::default();
         } else if let Some(change) = self.heat.update(&driven.torque, &most, cx.dt()) {

@@ -22,11 +22,21 @@ fn alive<A, R>(
 impl Driver {
     /// The operations, and the faults that a script may inject.
     pub(super) fn offer_operations(b: &mut Builder<Self>) {
-        b.doc("Changes what the drives do: 0 off, 1 hold a position, 6 take torques.").operation(
+        b.doc(
+            "Changes what the drives do: 0 off (done when their torque has faded), 1 hold a position, 6 take torques.",
+        )
+        .operation(
             "setControlMode",
-            alive(|c, _, (mode,): (u8,)| match DriveMode::from_number(mode) {
+            alive(|c, cx, (mode,): (u8,)| match DriveMode::from_number(mode) {
                 Some(mode) if mode != DriveMode::MotorStop && !c.arm_is_there => OperationAnswer::failed(NO_ARM),
-                Some(mode) => c.drives.set_mode(mode).map_or_else(OperationAnswer::failed, OperationAnswer::Done),
+                Some(mode) => match c.drives.set_mode(mode) {
+                    // What is stopped next takes away what is left at once.
+                    Ok(()) if mode == DriveMode::MotorStop && c.running && c.arm_is_there && c.drives.fades() => {
+                        (c.task, c.goes_off) = (Some(cx.ticket()), true);
+                        OperationAnswer::Pending
+                    }
+                    set => set.map_or_else(OperationAnswer::failed, OperationAnswer::Done),
+                },
                 None => OperationAnswer::failed(format!("no control mode {mode}: 0, 1 or 6")),
             }),
         );

@@ -1,0 +1,188 @@
+//! What is no word of SCXML: attributes that it does not have, elements of other languages, text. Nothing is passed over without a word.
+
+use super::{ScxmlReader, own};
+use crate::lang::print::scxml::{OURS, SCXML};
+use crate::model::codes;
+use crate::model::finding::did_you_mean;
+use roxmltree::Node as Element;
+use rustc_hash::FxHashSet;
+
+/// The elements that are read, with their attributes.
+const ATTRIBUTES: &[(&str, &[&str])] = &[
+    ("scxml", &["initial", "name", "version", "datamodel", "binding", "exmode"]),
+    ("state", &["id", "initial"]),
+    ("final", &["id"]),
+    ("initial", &[]),
+    ("transition", &["event", "cond", "target", "type"]),
+    ("onentry", &[]),
+    ("onexit", &[]),
+    (
+        "send",
+        &[
+            "event",
+            "eventexpr",
+            "target",
+            "targetexpr",
+            "type",
+            "typeexpr",
+            "id",
+            "idlocation",
+            "delay",
+            "delayexpr",
+            "namelist",
+        ],
+    ),
+    ("cancel", &["sendid", "sendidexpr"]),
+    ("log", &["label", "expr"]),
+    ("datamodel", &[]),
+];
+
+/// Attributes without a counterpart, and what to do instead.
+const NONE: &[(&str, &str, &str)] = &[
+    ("send", "targetexpr", "write where it is for: `target=\"#_parent\"`"),
+    ("send", "typeexpr", "leave it out: events are all that is sent"),
+    ("send", "idlocation", "a coordinator has no data: name it with `id`"),
+    ("send", "namelist", "an event carries no data here"),
+    ("cancel", "sendidexpr", "name what is taken back: `sendid=\"…\"`"),
+];
+
+/// The namespace of what Qt's editor notes, also in transitions.
+const QT: &str = "http://www.qt.io/2015/02/scxml-ext";
+
+/// The namespace of what puts documents together.
+const XINCLUDE: &str = "http://www.w3.org/2001/XInclude";
+
+impl<'t> ScxmlReader<'_, 't> {
+    /// Findings for all that is in `root` and means nothing here, in documents of others.
+    pub(super) fn strange(&mut self, root: Element<'_, 't>) {
+        let mut told: FxHashSet<(String, String)> = FxHashSet::default();
+        for element in root.descendants() {
+            if element.is_text() {
+                self.text(element);
+            } else if element.is_element() && element.tag_name().namespace() == Some(SCXML) {
+                self.attributes(element);
+            } else if element.is_element() {
+                self.of_others(element, &mut told);
+            }
+        }
+    }
+
+    fn attributes(&mut self, element: Element<'_, 't>) {
+        let name = element.tag_name().name();
+        let Some((_, known)) = ATTRIBUTES.iter().find(|(of, _)| *of == name) else { return };
+        for attribute in element.attributes().filter(|attribute| attribute.namespace().is_none()) {
+            let key = attribute.name();
+            if let Some((.., help)) = NONE.iter().find(|(of, none, _)| (*of, *none) == (name, key)) {
+                self.no_counterpart(element, format!("`{key}` of `{name}` has no counterpart here"), help);
+            } else if !known.contains(&key) {
+                let help = did_you_mean(key, "attributes", known.iter().copied());
+                self.report(element, codes::TEXT_UNKNOWN_KEY, format!("`{name}` has no attribute `{key}`"), &help);
+            }
+        }
+        let kind =
+            element.attribute("type").filter(|kind| name == "transition" && !["internal", "external"].contains(kind));
+        if let Some(kind) = kind {
+            let message = format!("`{kind}` is no type of a transition");
+            self.report(element, codes::TEXT_BAD_VALUE, message, "write `internal` or `external`, or leave it out");
+        }
+    }
+
+    /// An element of another language: one that would be carried out, or would bring more, changes what the chart does.
+    fn of_others(&mut self, element: Element<'_, 't>, told: &mut FxHashSet<(String, String)>) {
+        let (name, space) = (element.tag_name().name(), element.tag_name().namespace().unwrap_or_default());
+        let inside = |around: &Element<'_, 't>| around.tag_name().namespace() == Some(SCXML);
+        let Some(around) = element.parent_element().filter(inside).filter(|_| ![OURS, QT].contains(&space)) else {
+            return;
+        };
+        if space == XINCLUDE {
+            self.no_counterpart(
+                element,
+                format!("`{name}` brings in another document, which is not read"),
+                "put its text here",
+            );
+        } else if space.is_empty() {
+            let help = format!("SCXML's elements have its namespace: `<scxml xmlns=\"{SCXML}\" …>`");
+            self.report(element, codes::TEXT_UNKNOWN_KEY, format!("SCXML has no element `{name}`"), &help);
+        } else if ["onentry", "onexit", "transition"].contains(&around.tag_name().name())
+            && told.insert((space.to_owned(), name.to_owned()))
+        {
+            let message = format!("`{name}` is of another language (`{space}`): what it would do is not done here");
+            let help = "let a component do it, and ask for it by a configuration";
+            self.warn(element, codes::SCXML_NO_COUNTERPART, message, help);
+        }
+    }
+
+    fn text(&mut self, text: Element<'_, 't>) {
+        let around = text.parent_element().filter(|around| around.tag_name().namespace() == Some(SCXML));
+        let Some(around) =
+            around.filter(|around| ATTRIBUTES.iter().any(|(name, _)| around.has_tag_name((SCXML, *name))))
+        else {
+            return;
+        };
+        let said = text.text().unwrap_or_default().trim();
+        if !said.is_empty() && !around.has_tag_name((SCXML, "log")) {
+            let (name, said) = (around.tag_name().name(), said.chars().take(32).collect::<String>());
+            let message = format!("text in `{name}` means nothing: `{said}`");
+            self.report(around, codes::TEXT_UNKNOWN_KEY, message, "put it into a comment: `<!-- … -->`");
+        }
+    }
+
+    /// What is sent later by a state belongs to that here: it ends with it.
+    pub(super) fn sent_later(&mut self, state: Element<'_, 't>) {
+        if self.ours {
+            return;
+        }
+        let blocks = |of| inside(state, of).into_iter();
+        let taken_back: FxHashSet<&str> =
+            blocks("onexit").flat_map(|block| inside(block, "cancel")).filter_map(|c| c.attribute("sendid")).collect();
+        let transitions = blocks("transition").filter_map(|transition| transition.attribute("event"));
+        let heard: FxHashSet<&str> = transitions.flat_map(str::split_whitespace).collect();
+        let mut own: FxHashSet<&str> = FxHashSet::default();
+        for send in blocks("onentry").flat_map(|block| inside(block, "send")) {
+            let (Some(event), Some(_)) = (send.attribute("event"), send.attribute("delay")) else { continue };
+            own.extend(send.attribute("id"));
+            if send.attribute("target").is_some_and(|target| target != "#_internal") {
+                let message = format!("`{event}` is sent later to the outside");
+                let help = "send it on the entry of a state that a time event (`e_after`) leads to";
+                self.no_counterpart(send, message, help);
+            } else if heard.contains(event) && !send.attribute("id").is_some_and(|id| taken_back.contains(id)) {
+                let message =
+                    format!("`{event}` comes in SCXML also when this state was left; here it ends with the state");
+                let help = "give it an `id`, and take it back on exit: `<onexit><cancel sendid=\"…\"/></onexit>`";
+                self.warn(send, codes::SCXML_OUTLIVES, message, help);
+            }
+        }
+        for send in blocks("onexit").flat_map(|block| inside(block, "send")) {
+            if let (Some(event), Some(_)) = (send.attribute("event"), send.attribute("delay")) {
+                let message = format!("`{event}` is sent later when the state is left");
+                self.no_counterpart(send, message, "send it on the entry of the state that waits for it");
+            }
+        }
+        // Elsewhere it takes back what has ended with its state.
+        let at_once = blocks("onentry").flat_map(|block| inside(block, "cancel"));
+        let at_once = at_once.filter(|cancel| cancel.attribute("sendid").is_some_and(|id| own.contains(id)));
+        for cancel in at_once.collect::<Vec<_>>() {
+            let help = "leave both out, or take it back on exit";
+            self.no_counterpart(cancel, "what is sent later is taken back at once", help);
+        }
+    }
+
+    /// Whether an event has a name that means something by itself here, and nothing in SCXML.
+    pub(super) fn is_taken(&mut self, element: Element<'_, 't>, event: &str) -> bool {
+        let taken = event == "e_done"
+            || event.starts_with("e_done@")
+            || event.starts_with("e_after(")
+            || event.starts_with("e_at(");
+        let taken = taken && !self.ours && own(element, "event").is_none();
+        if taken {
+            let message = format!("`{event}` is no name of an event: here it means a completion, or a time");
+            self.report(element, codes::TEXT_BAD_NAME, message, "give the event another name");
+        }
+        taken
+    }
+}
+
+/// The elements of SCXML of this name right in another one.
+fn inside<'a, 'i>(element: Element<'a, 'i>, name: &str) -> Vec<Element<'a, 'i>> {
+    element.children().filter(|child| child.has_tag_name((SCXML, name))).collect()
+}
