@@ -155,8 +155,11 @@ impl Look<'_> {
         let mut read = FxHashSet::default();
         let heard = |event: EventName| self.hears(event);
         for monitor in self.deployment.monitors.iter().filter(|monitor| monitor.events().any(heard)) {
-            // What runs it does not tell that it is dead itself.
-            let runs = |name: ComponentName| self.is(name, |ty| is_monitors(ty.name) && ty.name == monitor.run_by());
+            // What alone runs it does not tell that it is dead itself.
+            let run_by = |name: ComponentName| self.is(name, |ty| is_monitors(ty.name) && ty.name == monitor.run_by());
+            let runs = |name: ComponentName| {
+                run_by(name) && !self.universe.components().any(|other| other != name && run_by(other))
+            };
             monitor.when.for_each_component(&mut |component, _| {
                 if !runs(component) {
                     read.insert(component);

@@ -232,7 +232,14 @@ fn what_is_no_word_of_scxml_is_told() {
             "brings in another document",
         ),
         (format!("<onentry>{sent}</onentry>{to_b}"), "comes in SCXML also when this state was left"),
-        (format!("<onentry>{sent}<cancel sendid=\"i\"/></onentry>{on_exit}{to_b}"), "taken back at once"),
+        (format!("<onentry>{sent}<cancel sendid=\"i\"/></onentry>{on_exit}{to_b}"), "taken back while the state"),
+        (
+            format!(
+                "<onentry>{sent}</onentry>{on_exit}{to_b}<state id=\"c\"><onentry><cancel sendid=\"i\"/></onentry></state>"
+            ),
+            "taken back while the state",
+        ),
+        (format!("<onentry>{sent}{sent}</onentry>{on_exit}{to_b}"), "`s` is sent later twice"),
         (format!("<onexit>{sent}</onexit>{to_b}"), "`s` is sent later when the state is left"),
         (
             format!("<onentry>{}</onentry>{on_exit}{to_b}", sent.replace("id=", "target=\"#_parent\" id=")),

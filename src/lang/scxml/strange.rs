@@ -137,10 +137,14 @@ impl<'t> ScxmlReader<'_, 't> {
             blocks("onexit").flat_map(|block| inside(block, "cancel")).filter_map(|c| c.attribute("sendid")).collect();
         let transitions = blocks("transition").filter_map(|transition| transition.attribute("event"));
         let heard: FxHashSet<&str> = transitions.flat_map(str::split_whitespace).collect();
-        let mut own: FxHashSet<&str> = FxHashSet::default();
+        let (mut own, mut sent): (FxHashSet<&str>, FxHashSet<&str>) = (FxHashSet::default(), FxHashSet::default());
         for send in blocks("onentry").flat_map(|block| inside(block, "send")) {
             let (Some(event), Some(_)) = (send.attribute("event"), send.attribute("delay")) else { continue };
             own.extend(send.attribute("id"));
+            if !sent.insert(event) {
+                let message = format!("`{event}` is sent later twice by one state");
+                self.no_counterpart(send, message, "give the two events names of their own");
+            }
             if send.attribute("target").is_some_and(|target| target != "#_internal") {
                 let message = format!("`{event}` is sent later to the outside");
                 let help = "send it on the entry of a state that a time event (`e_after`) leads to";
@@ -158,12 +162,19 @@ impl<'t> ScxmlReader<'_, 't> {
                 self.no_counterpart(send, message, "send it on the entry of the state that waits for it");
             }
         }
-        // Elsewhere it takes back what has ended with its state.
-        let at_once = blocks("onentry").flat_map(|block| inside(block, "cancel"));
-        let at_once = at_once.filter(|cancel| cancel.attribute("sendid").is_some_and(|id| own.contains(id)));
-        for cancel in at_once.collect::<Vec<_>>() {
-            let help = "leave both out, or take it back on exit";
-            self.no_counterpart(cancel, "what is sent later is taken back at once", help);
+        // In another state it takes back what has ended with this one.
+        for cancel in state.descendants().filter(|element| element.has_tag_name((SCXML, "cancel"))) {
+            let own = cancel.attribute("sendid").is_some_and(|id| own.contains(id));
+            let Some(block) = cancel.parent_element().filter(|_| own) else { continue };
+            let leaves = block.has_tag_name((SCXML, "onexit")) || block.has_tag_name((SCXML, "transition"));
+            if !(leaves && block.parent_element() == Some(state)) {
+                let message = "what is sent later is taken back while the state that sends it goes on";
+                self.no_counterpart(
+                    cancel,
+                    message,
+                    "take it back on exit of that state, or send it in a state inside",
+                );
+            }
         }
     }
 
