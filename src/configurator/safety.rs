@@ -28,8 +28,8 @@ pub(super) fn coming(number: u64) -> FrameId {
 }
 
 impl Safety {
-    /// What one does to the stack, as far as it is known by now: frames of those that came before and have ended have their numbers. One
-    /// that has ended *broken* leaves none that another one would take the place of: what was done of it stays.
+    /// What one does to the stack, as far as it is known by now: frames of those that came before and have ended have their numbers. What was
+    /// done of one that has ended *broken* is taken over when this one is pushed.
     pub fn settled(&self, mut edits: Edits) -> Edits {
         for (id, _) in &mut edits.pops {
             let ended = self.pushed.iter().find(|(number, _)| coming(*number) == *id);
