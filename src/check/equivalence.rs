@@ -122,7 +122,7 @@ impl FrameBook {
 }
 
 fn hash_frame(frame: &Frame, hasher: &mut impl Hasher) {
-    (frame.configuration, frame.requester, frame.scope, frame.partial, frame.safe).hash(hasher);
+    (frame.configuration, frame.requester, frame.scope, frame.left, frame.partial, frame.safe).hash(hasher);
     frame.parts.len().hash(hasher);
     frame.steps().len().hash(hasher);
     for saved in &frame.saved {
@@ -133,7 +133,7 @@ fn hash_frame(frame: &Frame, hasher: &mut impl Hasher) {
 /// Whether two frames differ in nothing but their number, age and memory.
 fn same_frame(a: &Frame, b: &Frame) -> bool {
     (a.configuration, a.group, a.requester, a.scope) == (b.configuration, b.group, b.requester, b.scope)
-        && (a.partial, a.safe, &a.floor) == (b.partial, b.safe, &b.floor)
+        && (a.left, a.partial, a.safe, &a.floor) == (b.left, b.partial, b.safe, &b.floor)
         && a.parts == b.parts
         && a.saved == b.saved
         && same_inverse(&a.inverse, &b.inverse)

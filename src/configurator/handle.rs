@@ -211,7 +211,7 @@ impl ConfiguratorHandle {
     }
 
     /// The event that ends the deployment was raised: until it is down, or (`false`) the one that begins it is raised, an undo
-    /// of a coordinator takes along what operators have put in its way.
+    /// of a coordinator takes along what nobody asks for any more and is in its way.
     pub fn leaving(&self, leaving: bool) {
         self.inner.post.leaving(leaving);
     }

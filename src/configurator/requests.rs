@@ -9,8 +9,8 @@ use super::request::{Reason, Request};
 use super::running::{Purpose, Running};
 use crate::model::{Ask, ConfigId, RequestId, Verdict};
 use crate::stack::{
-    About, Batch, Broken, Endings, Frame, FrameId, Gone, Group, Part, Pile, Planned, Rules, Stopped, Why, settle,
-    take_up,
+    About, Batch, Broken, Endings, Frame, FrameId, Gone, Group, Part, Pile, Planned, Rules, Stopped, TakenAlong, Why,
+    settle, take_up,
 };
 use crate::time::Time;
 use crate::transaction::{BrokenPart, Input, Limit, PartEnd, Spec, Transaction};
@@ -208,7 +208,7 @@ impl Engine {
             for (part, ended) in parts.into_iter().enumerate() {
                 let request = requests[group.places[part]];
                 let with = &planned.parts[part].along;
-                let took = || Reason::TookAlong(with.iter().map(|along| along.frame.configuration).collect());
+                let took = || Reason::TookAlong(with.iter().map(|along| TakenAlong::of(&along.frame)).collect());
                 let whole = matches!(ended, PartEnd::Done) && !with.is_empty();
                 reasons.push(if whole { Some(took()) } else { ended.reason() });
                 let stood = stood.iter().find(|(of, _)| *of == part).map(|(_, number)| *number);

@@ -8,7 +8,8 @@ use super::request::{Reason, Request};
 use super::running::{Purpose, Running};
 use super::safety::coming;
 use crate::model::{Ask, ComponentName, ConfigId, Step, Target, Verdict};
-use crate::stack::{BestEffort, Frame, Residual, SafeEnd, Stack, effort};
+use crate::stack::{BestEffort, Frame, Planned, Residual, SafeEnd, Stack, effort};
+use crate::system::touch::{Slot, slot};
 use crate::system::{System, step, touch};
 use crate::transaction::{BrokenPart, Input, PartEnd, Spec, Touched, Transaction};
 use smallvec::SmallVec;
@@ -50,6 +51,16 @@ impl Engine {
             effort(&with(system, earlier), &stack, configuration, &request, at, &self.given.context)
         };
         let BestEffort { mut planned, frame, troubles } = plan(&self.world.system, &earlier);
+        // What is on its way to the platform may have come there or not: what this one wants is written either way.
+        let mut out = self.values_out();
+        let mut here = with(&self.world.system, &out);
+        if !out.is_empty() {
+            let there = plan(&here, &earlier).planned;
+            let writes = |planned: &Planned, of: Slot| planned.steps.iter().any(|planned| slot(&planned.step) == of);
+            out.retain(|step| writes(&there, slot(step)) && !writes(&planned, slot(step)));
+            here = with(&self.world.system, &out);
+            planned = plan(&here, &earlier).planned;
+        }
         let mut yields = false;
         for other in self.running.iter_mut().filter(|other| comes_after.contains(&other.number)) {
             // Its own frame tells what it wanted, whoever does it.
@@ -57,7 +68,7 @@ impl Engine {
         }
         if yields {
             let (left, _) = self.earlier_safe(&request);
-            planned = plan(&self.world.system, &left).planned;
+            planned = plan(&here, &left).planned;
         }
         let mut touched = Touched::default();
         planned.steps.iter().for_each(|planned| touched.add(&planned.step));
@@ -70,6 +81,7 @@ impl Engine {
                 touched.add_state(component, entry.state);
             }
         }
+        planned.popped.iter().for_each(|frame| touched.takes_place_of(frame));
         touched.leaves(&frame);
         touched.planned_at(self.world.system.revision());
         self.safety.troubles.push((request.id, troubles));
@@ -96,6 +108,12 @@ impl Engine {
             }
         }
         (steps, numbers)
+    }
+
+    /// Values on their way to the platform, of steps that were interrupted.
+    fn values_out(&self) -> Vec<Step> {
+        let interrupted = self.running.iter().filter(|running| running.is_interrupted());
+        interrupted.flat_map(|running| running.machine.values_out()).cloned().collect()
     }
 
     /// The stack as those of its group leave it that are being applied: it takes their places.

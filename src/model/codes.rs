@@ -429,8 +429,8 @@ codes! {
         "The frame contains a step that cannot be undone, or the state was committed after it: it is a floor, and neither it nor a frame below it can be popped that is of the same file and shares a component with it. Apply a configuration that leads to the wanted state instead.";
     STACK_SHARED = "stack::shared", "a frame above shares something with this one",
         "A frame below the top can be popped only when nothing above it wrote what it wrote or needs it to be as it is. What a parent set, wrote or called in a subsystem keeps nothing of that from being undone, only what it has connected. The finding names the frame above and the thing they share. Undo the frame above first, or undo down to this one (`davit undo --to N`).";
-    STACK_TAKEN_ALONG = "stack::taken_along", "an operator's frame was undone with a coordinator's",
-        "While a deployment is led down, what its coordinator undoes takes along the frames of operators that stand in its way: newest first, in one transaction, both or none. Not what is `safe`, nor what would move when it is undone: then the coordinator's undo is refused, and says so.";
+    STACK_TAKEN_ALONG = "stack::taken_along", "what stood in its way was undone with it",
+        "While a deployment is led down, what its coordinator undoes takes along the frames of operators that stand in its way, and its own of states that were left and that were not undone then (something safe came, or that failed): newest first, in one transaction, both or none. Not what is `safe`, nor what would move when it is undone: then the coordinator's undo is refused, and says so.";
     STACK_GROUP = "stack::group", "the group's present frame cannot be replaced",
         "Configurations of one group are alternatives: applying one pops the frame of the other first. That frame cannot be popped, for the reason given, so the new configuration is refused and nothing has changed. Undo what stands in the way first.";
     STACK_FOREIGN = "stack::foreign", "the frame belongs to another coordinator",

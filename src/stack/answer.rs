@@ -1,5 +1,6 @@
 //! What comes of requests: verdicts with their reasons, and what is left where something is broken.
 
+use super::Frame;
 use super::request::Request;
 use crate::model::codes;
 use crate::model::finding::count;
@@ -106,12 +107,28 @@ pub enum Reason {
     NothingAbove(usize),
     /// It was to be undone, and had no frame.
     NotInForce(ConfigId),
-    /// It was undone, and these frames of operators with it, which stood in its way.
-    TookAlong(Vec<ConfigId>),
+    /// It was undone, and these frames with it, which stood in its way.
+    TookAlong(Vec<TakenAlong>),
     /// Everything is being taken down.
     TakenDown,
     /// The configurator has ended.
     Ended,
+}
+
+/// A frame that was undone with another one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TakenAlong {
+    /// Its configuration.
+    pub configuration: ConfigId,
+    /// It is of a state of the coordinator that was left; else an operator's.
+    pub left: bool,
+}
+
+impl TakenAlong {
+    /// What is told of that frame.
+    pub fn of(frame: &Frame) -> Self {
+        Self { configuration: frame.configuration, left: frame.left }
+    }
 }
 
 /// What is left of an application that is neither done nor undone.
@@ -317,9 +334,15 @@ impl fmt::Display for Reason {
             ),
             Self::NothingAbove(left) => write!(f, "there is nothing to undo: no more is in force than {}", count(left, "frame")),
             Self::NotInForce(id) => write!(f, "`{id}` was not in force: there was nothing to undo"),
-            Self::TookAlong(ids) => {
-                let ids: Vec<String> = ids.iter().map(|id| format!("`{id}`")).collect();
-                write!(f, "{} of an operator was undone with it, since it stood in its way", ids.join(", "))
+            Self::TookAlong(frames) => {
+                let of = |left: bool, whose: &str| {
+                    let ids = frames.iter().filter(|frame| frame.left == left);
+                    let ids: Vec<String> = ids.map(|frame| format!("`{}`", frame.configuration)).collect();
+                    let told = format!("{} of {whose} was undone with it, since it stood in its way", ids.join(", "));
+                    (!ids.is_empty()).then_some(told)
+                };
+                let told = [of(false, "an operator"), of(true, "a state that was left")];
+                f.write_str(&told.into_iter().flatten().collect::<Vec<_>>().join("; "))
             }
             Self::TakenDown => f.write_str("the system is being taken down"),
             Self::Ended => f.write_str("the configurator has ended"),

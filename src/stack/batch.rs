@@ -39,7 +39,7 @@ pub struct Rules<'a> {
     pub joined: bool,
     /// Its pushes have taken their place on the stack when they began: what others hold on to since does not matter.
     pub placed: bool,
-    /// It takes along what operators have put in the way of its undos, while this is led down.
+    /// It takes along what nobody asks for any more and is in the way of its undos, while this is led down.
     pub led: Option<LedDown>,
     /// What is known of pushes in the system of the world; none: each is planned.
     pub pushes: Option<PushesOf<'a>>,

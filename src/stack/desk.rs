@@ -20,7 +20,7 @@ pub struct ActiveBatch {
     pub batch: Batch,
     /// Undos that have given up requests of it, in the order in which they came.
     pub given_up: Vec<GivenUp>,
-    /// While this is led down its undos take along what operators have put in their way, which they claim as well until it is over
+    /// While this is led down its undos take along what nobody asks for any more and is in their way, which they claim as well until it is over
     /// ([`Stack::taken_along`]).
     ///
     /// [`Stack::taken_along`]: super::Stack::taken_along

@@ -71,8 +71,8 @@ fn taken_over(old: &Frame, new: &Frame) -> Frame {
     let again = |item: &DraftStep| matches!(item.step, Step::Operation(_)) && own.iter().any(|o| o.step == item.step);
     let rest: Vec<DraftStep> = list(old).into_iter().filter(|item| !again(item)).collect();
     let old = Frame { inverse: Inverse::List(Arc::new(rest)), ..old.clone() };
-    let (group, scope, partial) = (new.group, new.scope, new.partial);
-    Frame { group, scope, partial, parts: Arc::default(), ..squash(&old, new) }
+    let (group, scope, left, partial) = (new.group, new.scope, new.left, new.partial);
+    Frame { group, scope, left, partial, parts: Arc::default(), ..squash(&old, new) }
 }
 
 /// The frame of a safe configuration of which these steps were not done: it takes back what was.
@@ -128,6 +128,7 @@ fn piecewise(
         floor: crate::plan::irreversible(&steps).map(str::to_owned),
         parts: Arc::default(),
         scope: request.scope,
+        left: false,
         partial: !troubles.is_empty(),
         safe: true,
     };

@@ -1,7 +1,9 @@
-//! What a coordinator that leads down takes along: frames of operators that stand in the way of what it undoes (semantics: *Stopping*).
+//! What a coordinator that leads down takes along: frames that nobody asks for any more and that stand in the way of what it
+//! undoes (semantics: *Stopping*).
 //!
 //! An operator may have put something on top of what a coordinator has applied; while everything is being stopped nobody is
-//! there who would take that away again. So it goes first, newest first, in one transaction with the undo that was asked for:
+//! there who would take that away again. And what a state brought with it may be in force though that was left: something safe
+//! came while it was to be undone, or that failed. The coordinator's chart has no place from where it would be asked for again. So it goes first, newest first, in one transaction with the undo that was asked for:
 //! both or none. What is `safe`, and what would move, is nobody's to take along.
 
 use super::claims::{Claim, Claims};
@@ -23,6 +25,11 @@ fn takes_along(request: &Request) -> bool {
     request.why == Why::Asked && request.ask.is_undo() && matches!(request.requester, Requester::Coordinator(_))
 }
 
+/// Whether a frame may be one that an undo takes along.
+fn is_loose(frame: &Frame, by: Requester) -> bool {
+    frame.requester == Requester::Operator || frame.left && frame.requester == by
+}
+
 /// What a frame is about that is outside of what is led down.
 fn outside(led: LedDown, frame: &Frame) -> Option<ComponentName> {
     let LedDown::Inside(path) = led else { return None };
@@ -30,15 +37,13 @@ fn outside(led: LedDown, frame: &Frame) -> Option<ComponentName> {
 }
 
 impl Stack {
-    /// What a batch claims beside what its text names, since its undos may take it along while this is led down: frames of operators that are
-    /// about what it is about, and those that are about what these are about. None: there are none.
+    /// What a batch claims beside what its text names, since its undos may take it along while this is led down: frames of operators, and of states
+    /// that its coordinator has left, that are about what it is about, and those that are about what these are about. None: there are none.
     pub fn taken_along(&self, batch: &Batch, led: LedDown, claims: &Claims) -> Option<Claim> {
         let own = |request: &Request| takes_along(request) && led.is_led_by(request.requester);
-        let theirs = |frame: &&Arc<Frame>| frame.requester == Requester::Operator && outside(led, frame).is_none();
-        let mut open: Vec<Claim> = match batch.requests.iter().any(own) {
-            true => self.frames.iter().filter(theirs).map(|frame| claims.of_frame(frame)).collect(),
-            false => return None,
-        };
+        let by = batch.requests.iter().find(|request| own(request))?.requester;
+        let loose = self.frames.iter().filter(|frame| is_loose(frame, by) && outside(led, frame).is_none());
+        let mut open: Vec<Claim> = loose.map(|frame| claims.of_frame(frame)).collect();
         let (mut about, mut along) = (claims.of(&batch.requests), None);
         while let Some(at) = open.iter().position(|frame| frame.meets(&about)) {
             let frame = open.swap_remove(at);
@@ -53,7 +58,7 @@ impl Stack {
 /// none. `frames` are those that there are then, `led` is what is led down. `repaired`: what is broken is mended before.
 ///
 /// # Errors
-/// What stands in its way and stays, in words: of a frame of an operator also why it does.
+/// What stands in its way and stays, in words: of one that could be thought to be taken along also why it does.
 pub(super) fn along(
     world: &World,
     frames: &[Arc<Frame>],
@@ -75,16 +80,21 @@ pub(super) fn along(
         let Err(hindrance) = share::look(&rest, at) else { continue };
         let Hindrance { by, finding } = *hindrance;
         let frame = rest.iter().find(|frame| Some(frame.id) == by);
-        let why = match frame.map(|frame| stays(world, frame, &rest, (led, repaired))) {
+        let why = match frame.map(|frame| stays(world, request.requester, frame, &rest, (led, repaired))) {
             Some(None) => None,
             Some(Some(why)) => Some(why),
             None => Some(None),
         };
         if let Some(why) = why {
-            let of = first.unwrap_or_else(|| finding.clone());
-            let why = why.or_else(|| (next != id).then_some(finding.message));
-            let told = why.map(|why| format!("{}; that is not undone with it: {why}", of.message));
-            return Err(Box::new(Finding { message: told.unwrap_or_else(|| of.message.clone()), ..of }));
+            // In the way of the undo itself, or of what would go with it.
+            let whole = |what: &str, why: String| format!("{what}; that is not undone with it: {why}");
+            let told = match why {
+                Some(why) => whole(&finding.message, why),
+                None => finding.message.clone(),
+            };
+            let first = first.filter(|_| next != id);
+            let message = first.map_or(told.clone(), |first| whole(&first.message, told));
+            return Err(Box::new(Finding { message, ..finding }));
         }
         let Some(frame) = frame else { continue };
         first.get_or_insert(finding);
@@ -100,11 +110,12 @@ pub(super) fn along(
 /// Whether a frame is not taken along from among these, and why, where it could be thought to be.
 fn stays(
     world: &World,
+    by: Requester,
     frame: &Frame,
     frames: &[Arc<Frame>],
     (led, repaired): (LedDown, bool),
 ) -> Option<Option<String>> {
-    if frame.requester != Requester::Operator {
+    if !is_loose(frame, by) {
         return Some(None);
     }
     if let Some(component) = outside(led, frame) {

@@ -33,7 +33,7 @@ mod void;
 mod work;
 mod world;
 
-pub use answer::{Answer, Reason, Residual};
+pub use answer::{Answer, Reason, Residual, TakenAlong};
 pub use batch::{Group, Rules, Told, held, keeps_still, may_apply, take_up};
 pub use desk::{ActiveBatch, Arrival, Arrived, Desk, GivenUp, Gone, given_up_of};
 pub use effort::{BestEffort, effort};
@@ -105,6 +105,8 @@ pub struct Frame {
     pub parts: Arc<BTreeSet<Buried>>,
     /// The state of its coordinator that it belongs to, while that is active: such a frame is never squashed.
     pub scope: Option<Scope>,
+    /// The state that it belonged to was left, and it was not undone then: nobody asks for it any more.
+    pub left: bool,
     /// It is what was done and not taken back of something that ended *broken*.
     pub partial: bool,
     /// Its configuration is a `safe` one.
@@ -272,10 +274,12 @@ impl Stack {
         self.safe().any(|safe| is_in_system(safe, component))
     }
 
-    /// The state that a frame belongs to has been left, and the frame stays: from now on it is one like others.
+    /// The state that a frame belongs to has been left, and the frame stays: from now on it is one like others, but that
+    /// its coordinator takes it along while it leads down.
     pub fn unscope(&mut self, frame: FrameId) {
         if let Some(frame) = self.frames.iter_mut().find(|f| f.id == frame && f.scope.is_some()) {
-            Arc::make_mut(frame).scope = None;
+            let frame = Arc::make_mut(frame);
+            (frame.scope, frame.left) = (None, true);
         }
     }
 

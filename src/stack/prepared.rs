@@ -150,7 +150,8 @@ impl Switch {
             return false;
         }
         let frame = Arc::make_mut(&mut self.frame);
-        (frame.id, frame.requester, frame.at, frame.scope) = (FrameId(u64::MAX), requester, at, scope);
+        (frame.id, frame.requester, frame.at) = (FrameId(u64::MAX), requester, at);
+        (frame.scope, frame.left) = (scope, false);
         let Inverse::Steps(steps) = &mut frame.inverse else { return false };
         // Once it was applied this way they are its own.
         let steps = Arc::make_mut(steps);

@@ -80,7 +80,7 @@ fn shared(frame: &Frame) -> [usize; 2] {
 /// Whether two frames that share their inverse and footprint differ in nothing but number and age.
 fn is_alike(a: &Frame, b: &Frame) -> bool {
     (a.configuration, a.group, a.requester, a.scope) == (b.configuration, b.group, b.requester, b.scope)
-        && (a.partial, a.safe, &a.floor) == (b.partial, b.safe, &b.floor)
+        && (a.left, a.partial, a.safe, &a.floor) == (b.left, b.partial, b.safe, &b.floor)
         && a.parts == b.parts
         && a.saved == b.saved
 }
@@ -326,6 +326,7 @@ pub(super) fn squash(lower: &Frame, upper: &Frame) -> Frame {
         floor,
         parts,
         scope: None,
+        left: lower.left && upper.left,
         partial: false,
         safe: lower.safe || upper.safe,
     }

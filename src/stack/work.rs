@@ -393,6 +393,7 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
             floor: floor.clone(),
             parts: Arc::default(),
             scope,
+            left: false,
             partial: false,
             safe: configuration.safe,
         });

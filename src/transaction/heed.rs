@@ -5,7 +5,7 @@ use super::Transaction;
 use super::touched::Touched;
 use crate::model::{ComponentName, RunState, Step, Transition, Wanted};
 use crate::plan::PlannedStep;
-use crate::system::touch::{Slot, components, slot};
+use crate::system::touch::{Slot, absolute, components, slot};
 use crate::system::{View, step};
 use rustc_hash::FxHashSet;
 use smallvec::{SmallVec, smallvec};
@@ -47,6 +47,12 @@ impl Transaction {
     /// The steps of a best effort that are not over.
     pub fn open_steps(&self) -> impl Iterator<Item = &Step> {
         self.forward.open().map(|planned| &planned.step)
+    }
+
+    /// Values that are on their way to the platform, of steps that are out: nobody knows whether they are there.
+    pub fn values_out(&self) -> impl Iterator<Item = &Step> {
+        let run = self.in_hand();
+        run.outstanding().map(|i| &run.list[i as usize].step).filter(|step| absolute(step).is_some())
     }
 
     /// A later safe configuration does these steps: what writes the same and has not begun is not issued any more. Answers

@@ -44,6 +44,11 @@ impl Touched {
         self.states.insert(component, wanted.into());
     }
 
+    /// Values that this frame has given are not in force any more: what they were before is.
+    pub fn takes_place_of(&mut self, frame: &Frame) {
+        self.slots.extend(frame.saved.iter().map(|saved| saved.slot));
+    }
+
     /// That is the frame that they leave: its calls are theirs, and only theirs.
     pub fn leaves(&mut self, frame: &Frame) {
         self.calls = calls(frame).collect();

@@ -183,3 +183,41 @@ fn an_emergency_that_comes_twice_and_fails_in_part_is_taken_back_whole() {
     let ran = demo.run(&["run", "part.lua", "--clock", "simulated"]);
     assert!(ran.out.contains("hold.broken") && ran.out.contains("left: 0\n"), "{}{}", ran.out, ran.err);
 }
+
+/// Where what is safe is no alternative of what the state before brought with it: the undo of that waits while it is applied, or is interrupted
+/// by it, and its frame stays. Nobody asks for it again, so it goes on the way down, in one with what it is in the way of.
+#[test]
+fn what_a_state_left_behind_goes_on_the_way_down() {
+    let given = |demo: &Demo, paused: bool| {
+        for file in ["conveyor.yaml", "configurations.yaml", "coordinator.yaml"] {
+            let text =
+                std::fs::read_to_string(format!("{}/examples/conveyor/{file}", env!("CARGO_MANIFEST_DIR"))).unwrap();
+            demo.write(file, &text);
+        }
+        demo.replace("configurations.yaml", "slow:\n    group: speed\n", "slow:\n");
+        demo.replace("configurations.yaml", "group: speed", "group: halt");
+        if paused {
+            demo.replace("configurations.yaml", "      - port_write: { port: belt.speed, value: 0.0 }\n", "");
+            demo.replace("coordinator.yaml", "config: slow }", "config: slow }\n        paused: {}");
+            let way = "        - { src: running, tgt: paused, events: [e_pause] }\n    failed: {}";
+            demo.replace("coordinator.yaml", "    failed: {}", way);
+        }
+    };
+    let twice = "fault('operation_call belt.brake', 'slow', 8, 0.2)
+        deploy('conveyor.yaml')
+        raise('e_stop') wait(0.05) raise('e_stop') wait(2) shutdown()";
+    let once = "fault('port_write belt.speed', 'slow', 9, 0.2)
+        deploy('conveyor.yaml') wait(0.5)
+        raise('e_pause') wait(0.05) raise('e_stop') wait(2) shutdown()";
+    for (paused, script) in [(false, twice), (true, once)] {
+        let demo = Demo::new();
+        given(&demo, paused);
+        let checked = demo.run(&["check", "conveyor.yaml"]);
+        assert!(checked.code == 0 && !checked.err.contains('⚠'), "{}", checked.err);
+        demo.write("s.lua", script);
+        let ran = demo.run(&["run", "s.lua", "--clock", "simulated"]);
+        assert!(ran.out.contains("slow.undo.failed"), "{}{}", ran.out, ran.err);
+        assert!(ran.out.contains("`slow` of a state that was left was undone with it"), "{}{}", ran.out, ran.err);
+        assert_eq!((ran.code, ran.out.contains("build.undo.failed")), (0, false), "{}{}", ran.out, ran.err);
+    }
+}

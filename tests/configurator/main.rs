@@ -12,6 +12,7 @@ mod repair;
 mod rig;
 mod safe;
 mod safe_ends;
+mod safe_out;
 mod step_batches;
 mod stuck;
 mod survival;
