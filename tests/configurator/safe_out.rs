@@ -10,7 +10,7 @@ fn about_a(grouped: &str) -> Rig {
     let all = [
         configuration("make", "", "create A; create B; set A.k 3", "A:running"),
         configuration("gain", "", "set A.k 7", ""),
-        configuration("low", "", "set A.k 3", ""),
+        configuration("low", "", "set A.k 3; call B.open", ""),
         configuration("hold", "", "call B.open", ""),
     ];
     let all = all.into_iter().map(|one| Configuration {
@@ -67,7 +67,7 @@ fn what_one_takes_the_place_of_does_not_come_back_with_what_it_interrupted() {
             slow(&rig, "property_set A.k = 7.0", lands);
             rig.submit("low.undo");
             rig.wait(0.02);
-            slow(&rig, "operation_call", 0.05);
+            slow(&rig, "operation_call", 0.3);
             if between {
                 rig.submit("low");
                 rig.wait(0.1);
