@@ -4,7 +4,11 @@
 //! cargo run --example own_components -- types mine.LowPass
 //! cargo run --example own_components -- check examples/own_components/deployment.yaml
 //! cargo run --example own_components -- deploy examples/own_components/deployment.yaml
+//! cargo run --example own_components -- run examples/own_components/gripper_story.lua --clock simulated
 //! ```
+
+#[path = "own_components/gripper.rs"]
+mod gripper;
 
 use davit::component::{Builder, Component, Context, In, Library, OperationAnswer, Out, Prop};
 
@@ -43,6 +47,6 @@ impl Component for LowPass {
 }
 
 fn main() -> std::process::ExitCode {
-    let mine = Library::new("mine").with::<LowPass>("mine.LowPass");
+    let mine = Library::new("mine").with::<LowPass>("mine.LowPass").with::<gripper::Gripper>("mine.Gripper");
     davit::main(davit::builtin().with(mine))
 }

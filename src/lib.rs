@@ -122,11 +122,12 @@ pub use cli::main;
 
 /// What component types of one's own are written with.
 ///
-/// `examples/own_components.rs` is a whole program with one. A component declares its ports, properties and operations
+/// `examples/own_components.rs` is a whole program with two, and `docs/components.md` goes through it. A component declares its ports, properties and operations
 /// with a [`Builder`](component::Builder), and is updated by an activity; it knows no other component, no configuration
 /// and no coordinator.
 pub mod component {
-    pub use crate::model::monitor::ValuePart;
+    pub use crate::model::monitor::{Comparison, Condition, ValuePart};
+    pub use crate::model::{Irreversible, Tunable};
     pub use crate::record;
     pub use crate::runtime::{
         Builder, Component, Context, EventIn, EventOut, Failure, In, Libraries, Library, OperationAnswer, Out,

@@ -229,8 +229,12 @@ impl Product<'_> {
                     if *verdict == Verdict::UndoFailed {
                         state.stayed = true;
                         let left = self.frames_left(&state);
+                        let there = self.worlds.get(state.world).is_some_and(|w| w.left_with(request, &left).is_some());
                         let went = self.worlds.stay(state.world, state.world, std::iter::once(*request), &left);
                         self.go(&mut state, &went);
+                        if !there {
+                            state.change(|seldom| _ = request.leaves(seldom.safe.iter_mut()));
+                        }
                     }
                     self.due(&mut state, *request, *verdict);
                 }

@@ -38,7 +38,9 @@ impl Product<'_> {
             return self.ends_somehow(state, number, top, requests, nexts);
         }
         let comes = self.comes(state, number);
-        for (place, reasons) in &comes.refused {
+        // What is safe came in between: who asks could not know of it, and its frame stays.
+        let stays = comes.refused.iter().any(|(place, why)| requests[*place].was_overtaken(why));
+        for (place, reasons) in comes.refused.iter().filter(|(place, why)| !requests[*place].was_overtaken(why)) {
             if requests[*place].requester != Requester::Operator {
                 nexts.troubles.push(Trouble::Refused(requests[*place], reasons.clone()));
             }
@@ -53,6 +55,9 @@ impl Product<'_> {
         for EndsSo { endings, given } in ways.iter() {
             let from = nexts.all.len();
             self.ends_given(state, number, requests, &comes, endings, given.clone(), nexts);
+            if stays {
+                nexts.all[from..].iter_mut().for_each(|next| next.failed = next.failed.max(Failed::Undo));
+            }
             if state.aside {
                 self.ends_as_aside(state, number, requests, &comes, endings, nexts);
             }

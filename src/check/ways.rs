@@ -34,6 +34,8 @@ pub fn ways(product: &mut Product<'_>) -> Traced {
             .filter(|_| !way.unfollowed)
             .flat_map(|(_, reasons)| reasons.clone())
             .map(placed)
+            // What has none is said where it is asked for.
+            .filter(|reason| reason.origin.is_some())
             .collect::<Vec<_>>()
     };
     let mut up = reasons(&rise);

@@ -62,6 +62,11 @@ impl ProgressView {
         Arc::new(self.tap.clone())
     }
 
+    /// The same for who wants to hear only what somebody has to decide.
+    pub fn quiet_observer(&self) -> Arc<dyn LogSink> {
+        Arc::new(Quiet(self.tap.clone()))
+    }
+
     /// A line of the command's own, for people. Never waits.
     pub fn line(&self, line: impl std::fmt::Display) {
         if !self.json {
@@ -103,6 +108,17 @@ impl ProgressView {
     /// The end: waits until all is written, as long as somebody reads. Answers how many lines were not.
     pub fn end(&self) -> u64 {
         self.tap.finish(if self.simulated { limits::TAP_PATIENCE } else { limits::TAP_END })
+    }
+}
+
+/// Passes on what is noted, and nothing else: it may be that people are waited for.
+struct Quiet(Tap<ToldLine>);
+
+impl LogSink for Quiet {
+    fn hear(&self, entry: &Arc<LogEntry>) {
+        if matches!(entry.what, Happening::Noted { .. }) {
+            self.0.hear(entry);
+        }
     }
 }
 

@@ -56,7 +56,7 @@ pub struct Args {
     /// Write what the script records into this folder: a file for each recording, as `davit monitor --samples` reads it.
     #[arg(long, value_name = "DIR")]
     samples: Option<PathBuf>,
-    /// Tell only what the script says and measures, and failures.
+    /// Tell only what the script says and measures, failures, and what somebody has to decide.
     #[arg(long, short)]
     quiet: bool,
     /// Print every event of the story as one JSON object a line.
@@ -119,7 +119,11 @@ impl Run for Args {
                 extensions: context.extensions.clone(),
                 load: self.parameters.options()?,
                 platform,
-                observer: (!self.quiet).then(|| progress.observer()),
+                observer: match self.quiet {
+                    true if self.json => None,
+                    true => Some(progress.quiet_observer()),
+                    false => Some(progress.observer()),
+                },
                 say,
                 interrupt,
                 door: Some(door(&clock, &leaving)),

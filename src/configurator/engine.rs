@@ -310,7 +310,9 @@ impl Engine {
                     self.owe(request);
                     if verdict == Verdict::UndoFailed {
                         let held = self.frames_left();
-                        self.world.stays(&request, &held);
+                        if !self.world.stays(&request, &held) {
+                            self.leaves_coming(&request);
+                        }
                     }
                     let reason = (verdict != Verdict::Undone).then_some(reason);
                     self.answer(request, verdict, reason);

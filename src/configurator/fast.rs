@@ -12,7 +12,7 @@ use super::switches::Fast;
 use super::teardown::own_plan;
 use crate::limits;
 use crate::model::{Ask, Cause, Outcome, Step};
-use crate::stack::{Batch, Group, HandOver, Planned, ResolvedStep, Switch, Why, World, may_apply};
+use crate::stack::{Batch, Group, HandOver, Planned, ResolvedStep, Stillness, Switch, Why, World, may_apply};
 use crate::time::Time;
 use crate::transaction::Transaction;
 use smallvec::SmallVec;
@@ -62,7 +62,7 @@ impl Engine {
         if self.switches.is_empty()
             || !self.world.broken.is_empty()
             || !self.world.quarantined.is_empty()
-            || request.still
+            || request.still != Stillness::No
             || self.world.stack.safe().next().is_some()
         {
             return Fared::Not;

@@ -46,7 +46,7 @@ impl Engine {
         let at = self.given.clock.now();
         // What earlier safe ones will have done counts as done; but what both write only this one does.
         let (earlier, comes_after) = self.earlier_safe(&request);
-        let stack = self.stack_with_earlier(id);
+        let stack = self.stack_with_earlier();
         let plan = |system: &System, earlier: &[Step]| {
             effort(&with(system, earlier), &stack, configuration, &request, at, &self.given.context)
         };
@@ -110,22 +110,34 @@ impl Engine {
         (steps, numbers)
     }
 
+    /// The state of a safe configuration that is not there yet has been left, and the undo is not carried out.
+    pub(super) fn leaves_coming(&mut self, undo: &Request) {
+        let applied = self.running.iter_mut().rev().filter_map(|running| match &mut running.purpose {
+            Purpose::Safe(safe) => Some(&mut **safe),
+            _ => None,
+        });
+        for (request, frame, _) in applied {
+            if undo.leaves(std::iter::once(request)).is_some() {
+                (frame.scope, frame.left) = (None, true);
+                return;
+            }
+        }
+        let _ = undo.leaves(self.safety.waiting.iter_mut());
+    }
+
     /// Values on their way to the platform, of steps that were interrupted.
     fn values_out(&self) -> Vec<Step> {
         let interrupted = self.running.iter().filter(|running| running.is_interrupted());
         interrupted.flat_map(|running| running.machine.values_out()).cloned().collect()
     }
 
-    /// The stack as those of its group leave it that are being applied: it takes their places.
-    fn stack_with_earlier(&self, id: ConfigId) -> Stack {
+    /// The stack as those leave it that are being applied: it takes the places of those of its group, past what the others have given.
+    fn stack_with_earlier(&self) -> Stack {
         let mut stack = self.world.stack.clone();
         for other in self.running.iter().rev() {
             let Purpose::Safe(safe) = &other.purpose else { continue };
-            let (request, frame, _) = &**safe;
-            if matches!(request.ask, Ask::Apply(of) if self.given.claims.replaces(id, of)) {
-                let edits = self.safety.settled(other.machine.planned().parts[0].edits.clone());
-                stack = stack.expecting(edits, frame.clone(), coming(other.number));
-            }
+            let edits = self.safety.settled(other.machine.planned().parts[0].edits.clone());
+            stack = stack.expecting(edits, safe.1.clone(), coming(other.number));
         }
         stack
     }

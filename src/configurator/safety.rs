@@ -31,9 +31,13 @@ impl Safety {
     /// What one does to the stack, as far as it is known by now: frames of those that came before and have ended have their numbers. What was
     /// done of one that has ended *broken* is taken over when this one is pushed.
     pub fn settled(&self, mut edits: Edits) -> Edits {
-        for (id, _) in &mut edits.pops {
-            let ended = self.pushed.iter().find(|(number, _)| coming(*number) == *id);
-            *id = ended.map_or(*id, |(_, frame)| *frame);
+        let real = |id: FrameId| {
+            let ended = self.pushed.iter().find(|(number, _)| coming(*number) == id);
+            ended.map_or(id, |(_, frame)| *frame)
+        };
+        for (id, hand) in &mut edits.pops {
+            *id = real(*id);
+            hand.renumber(real);
         }
         edits
     }

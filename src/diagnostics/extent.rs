@@ -70,7 +70,9 @@ pub fn find(text: &str, range: Range<usize>, word: &str) -> Option<Range<usize>>
 /// The first place in a range where `word` stands by itself, and is no piece of a longer name.
 fn find_word(text: &str, range: Range<usize>, word: &str) -> Option<Range<usize>> {
     let inside = text.get(range.clone())?;
-    let named = |c: char| c.is_alphanumeric() || c == '_';
+    // A number is no part of another one: there is no 0 in 0.0.
+    let number = word.bytes().all(|byte| byte.is_ascii_digit() || byte == b'-');
+    let named = |c: char| c.is_alphanumeric() || c == '_' || number && c == '.';
     let (first, last) = (word.starts_with(named), word.ends_with(named));
     let alone = |at: &usize| {
         let (before, after) = (&inside[..*at], &inside[at + word.len()..]);
@@ -179,6 +181,13 @@ pub fn token_end(text: &str, at: usize) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_number_is_no_part_of_another_one() {
+        let text = "set(\"a.b\", 0.0), timeout = 0, k = 10.5";
+        assert_eq!(find_word(text, 0..text.len(), "0"), text.rfind("= 0,").map(|at| at + 2..at + 3));
+        assert_eq!(find_word(text, 0..text.len(), "5"), None);
+    }
 
     #[test]
     fn calls_end_where_they_close() {

@@ -8,7 +8,8 @@
 use super::leave::along;
 use super::work::{Op, Planned, Room, Work};
 use super::{
-    FrameId, LedDown, Pile, PushesOf, Reason, Request, Requester, Residual, Why, World, claims, may_commit, share,
+    FrameId, LedDown, Pile, PushesOf, Reason, Request, Requester, Residual, Stillness, Why, World, claims, may_commit,
+    share,
 };
 
 use crate::model::{Ask, ComponentName, ConfigId, Configuration, Finding, OnFailure, Step, Verdict, codes};
@@ -376,7 +377,7 @@ fn foreign(frames: &[Arc<super::Frame>], request: &Request) -> Option<ConfigId> 
 pub fn keeps_still(world: &World, request: &Request, components: impl IntoIterator<Item = ComponentName>) -> bool {
     let foreign = request.requester == Requester::Operator || request.why != Why::Asked;
     let held = || components.into_iter().any(|component| world.stack.keeps_still(component));
-    request.still || foreign && !request.force && held()
+    request.still != Stillness::No || foreign && !request.force && held()
 }
 
 /// The part of a plan that must not be carried out now, and why: it needs a component in quarantine, or something would

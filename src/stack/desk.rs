@@ -5,7 +5,7 @@
 //! arise, and none starves.
 
 use super::claims::{Claim, Claims, is_of_system};
-use super::request::{Batch, LedDown, Request, Requester, Why};
+use super::request::{Batch, LedDown, Request, Requester, Stillness, Why};
 use super::{Reason, answer};
 use crate::model::{Ask, ConfigId, Verdict};
 use smallvec::SmallVec;
@@ -158,7 +158,8 @@ impl Desk {
             kept.requests.retain(|request| !replaced(request));
             // What is behind in a batch under way was asked for before as well.
             let behind = self.under_way.iter_mut().flat_map(|active| &mut active.batch.requests);
-            kept.requests.iter_mut().chain(behind.filter(|r| concerns(id, r))).for_each(|request| request.still = true);
+            behind.filter(|r| concerns(id, r)).for_each(|request| request.still.come(Stillness::Overtaken));
+            kept.requests.iter_mut().for_each(|request| request.still.come(Stillness::WithSafe));
             for request in self.cancel_waiting(|request| concerns(id, request)) {
                 let verdict = if request.ask.is_undo() { Verdict::UndoFailed } else { Verdict::Cancelled };
                 arrival.told.push((request, verdict, Reason::SafeCame(id)));

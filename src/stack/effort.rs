@@ -8,13 +8,14 @@ use super::squash::{list, squash};
 use super::void::rest;
 use super::work::{Op, Part, Planned, transaction};
 use super::{Edits, Frame, FrameId, Inverse, Reason, Request, Stack};
-use crate::model::{Change, Configuration, StateList, Step, codes};
+use crate::model::{Change, ChangeKind, ComponentName, Configuration, StateEntry, StateList, Step, Target, codes};
 use crate::plan::footprint::Footprint;
 use crate::plan::undo::{DraftStep, items};
 use crate::plan::{PlanContext, PlannedStep, plan_on};
-use crate::system::{Overlay, System};
+use crate::system::{Overlay, System, View};
 use crate::time::Time;
 use rustc_hash::FxHashSet;
+use std::borrow::Cow;
 use std::sync::Arc;
 
 /// A safe configuration, planned as far as it goes.
@@ -37,14 +38,39 @@ pub fn effort(
     at: Time,
     context: &PlanContext,
 ) -> BestEffort {
-    let op = Op::Push { configuration, requester: request.requester, at, scope: request.scope };
+    // What concerns a component that is not there has nothing to be made safe.
+    let there = of_what_is_there(system, configuration);
+    let configuration = &*there;
+    let scope = request.scope.filter(|_| !request.gone);
+    let op = Op::Push { configuration, requester: request.requester, at, scope };
     match transaction(system, stack, &[op], context) {
         Ok(planned) => match planned.parts[0].edits.push.as_deref().cloned() {
-            Some(frame) => BestEffort { planned, frame, troubles: Vec::new() },
+            Some(frame) => BestEffort { planned, frame: Frame { left: request.gone, ..frame }, troubles: Vec::new() },
             None => piecewise(system, configuration, request, at, context),
         },
         Err(_) => piecewise(system, configuration, request, at, context),
     }
+}
+
+/// A configuration without what is about components that are not there.
+fn of_what_is_there<'c>(system: &System, configuration: &'c Configuration) -> Cow<'c, Configuration> {
+    let created = |component: &ComponentName| {
+        let makes =
+            |change: &Change| matches!(&change.kind, ChangeKind::Create { component: of, .. } if of == component);
+        configuration.changes.iter().any(makes)
+    };
+    let there = |component: &ComponentName| system.component(*component).is_some() || created(component);
+    let entry = |entry: &StateEntry| !matches!(&entry.target, Target::Component(of) if !there(of));
+    let list = |of: &StateList| StateList::of(of.iter().filter(entry)).unwrap_or_default();
+    let change = |change: &Change| change.kind.components().iter().all(there);
+    let states = || configuration.pre.iter().chain(configuration.post.iter());
+    if configuration.changes.iter().all(change) && states().all(|one| entry(&one)) {
+        return Cow::Borrowed(configuration);
+    }
+    let mut rest = configuration.clone();
+    rest.changes.retain(change);
+    (rest.pre, rest.post) = (list(&configuration.pre), list(&configuration.post));
+    Cow::Owned(rest)
 }
 
 /// The frame of a safe configuration of a group takes the others of that group over that are still there: it did not find them yet when it
@@ -127,8 +153,8 @@ fn piecewise(
         saved,
         floor: crate::plan::irreversible(&steps).map(str::to_owned),
         parts: Arc::default(),
-        scope: request.scope,
-        left: false,
+        scope: request.scope.filter(|_| !request.gone),
+        left: request.gone,
         partial: !troubles.is_empty(),
         safe: true,
     };

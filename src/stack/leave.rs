@@ -121,7 +121,8 @@ fn stays(
     if let Some(component) = outside(led, frame) {
         return Some(Some(format!("it is about `{component}` as well, which goes on")));
     }
-    if frame.safe {
+    // What its own coordinator has left was to be let go of.
+    if frame.safe && !frame.left {
         return Some(Some("it is a safe configuration, and people let it go".to_owned()));
     }
     if let Some(step) = moving(frame, frames, &world.system) {

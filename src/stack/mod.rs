@@ -42,7 +42,7 @@ pub use permanent::may_commit;
 pub use pile::Pile;
 pub use prepared::{ResolvedStep, Switch};
 pub use pushes::{PlannedPushes, PushesOf};
-pub use request::{Batch, FrameId, LedDown, Request, Requester, Scope, Why};
+pub use request::{Batch, FrameId, LedDown, Request, Requester, Scope, Stillness, Why};
 pub use settle::{About, Ending, Endings, SafeEnd, Settled, Stopped, settle};
 pub use share::{HandOver, calls, components, is_kept, shares, staying};
 pub use stands::{is_stood_down, running_for};
@@ -406,8 +406,17 @@ impl Stack {
     /// Pushes the frame of a safe configuration that has been applied as far as it goes, with what goes with it.
     pub fn push_safe(&mut self, edits: Edits, frame: Frame, busy: &[FrameId]) -> FrameId {
         let push = Some(Arc::new(Frame { safe: true, ..frame }));
+        let (bound, waits) = (self.bound, edits.waits);
+        // Two of a group are one before they count.
+        self.bound = bound.saturating_add(1);
         let pushed = self.apply([&Edits { push, ..edits }], busy).first().copied().unwrap_or(FrameId(0));
+        self.bound = bound;
         effort::take_over_group(&mut self.frames, pushed, busy);
+        if let Some(pile) = self.frame(pushed).map(|frame| frame.pile()) {
+            let busy: SmallVec<[FrameId; 4]> = busy.iter().copied().chain(waits.then_some(pushed)).collect();
+            let room = squash::Quota { pile, bound, busy: &busy };
+            squash::fit(&mut self.frames, room, self.memory.as_ref());
+        }
         pushed
     }
 

@@ -2,7 +2,7 @@
 
 use crate::model::names::is_within;
 use crate::model::words::sent_as_shown;
-use crate::model::{Ask, ComponentName, ConfigId, Ident, OPERATOR, RequestId};
+use crate::model::{Ask, ComponentName, ConfigId, Finding, Ident, OPERATOR, RequestId, codes};
 use smallvec::SmallVec;
 use std::fmt;
 use std::hash::{Hash, Hasher};
@@ -49,6 +49,26 @@ pub enum Why {
     Down,
 }
 
+/// Whether what is asked for may move something.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Stillness {
+    /// It may.
+    No,
+    /// It was raised in the same step as a `safe` configuration.
+    WithSafe,
+    /// A `safe` configuration came while it stood behind others of its batch.
+    Overtaken,
+}
+
+impl Stillness {
+    /// A `safe` configuration comes.
+    pub fn come(&mut self, how: Self) {
+        if *self == Self::No {
+            *self = how;
+        }
+    }
+}
+
 /// One request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Request {
@@ -62,9 +82,10 @@ pub struct Request {
     pub scope: Option<Scope>,
     /// What is refused for the operator's sake is done all the same.
     pub force: bool,
-    /// Raised in the same step as a `safe` configuration: nothing of it may move.
-    pub still: bool,
-    /// It undoes by leaving a state whose frame of that visit was gone when a later visit's came: it undoes nothing.
+    /// Whether nothing of it may move, since a `safe` configuration came with it or since.
+    pub still: Stillness,
+    /// An undo by leaving a state: the frame of that visit was gone when a later visit's came, and it undoes nothing. A safe
+    /// configuration that a state brings with it: that was left, and the undo was not carried out.
     pub gone: bool,
     /// The connection through which an operator asks: its requests begin one after the other. 0: one that waits for no other.
     pub line: u32,
@@ -90,12 +111,28 @@ impl Request {
             requester,
             scope: None,
             force: false,
-            still: false,
+            still: Stillness::No,
             gone: false,
             line: 0,
             why: Why::Asked,
             tag: (0, 0),
         }
+    }
+
+    /// An undo by leaving a state is not carried out, and there is no frame of that visit: it is of a safe configuration that is still
+    /// `coming` (the oldest first), and that nobody asks for any more.
+    pub fn leaves<'r>(&self, coming: impl Iterator<Item = &'r mut Self>) -> Option<&'r mut Self> {
+        let Ask::UndoOf(id) = self.ask else { return None };
+        let of = |r: &Self| (r.ask, r.scope, r.requester) == (Ask::Apply(id), self.scope, self.requester) && !r.gone;
+        let mut coming = coming.filter(|_| self.scope.is_some() && !self.gone);
+        let left = coming.find(|request| of(request))?;
+        left.gone = true;
+        Some(left)
+    }
+
+    /// Whether it is refused for nothing but a `safe` configuration that came while it stood behind others.
+    pub fn was_overtaken(&self, refused: &[Finding]) -> bool {
+        self.still == Stillness::Overtaken && refused.iter().all(|reason| reason.code == codes::MOVES_WHILE_SAFE)
     }
 
     /// Whether what it is answered is for the state that asked, and for nobody once that has been left. What came of a

@@ -168,7 +168,7 @@ impl World {
         for (place, frame) in &settled.stay {
             match frame {
                 Some(frame) => self.stack.unscope(*frame),
-                None => self.stays(&requests[*place], &[]),
+                None => _ = self.stays(&requests[*place], &[]),
             }
         }
     }

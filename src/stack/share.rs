@@ -37,6 +37,11 @@ impl HandOver {
         self.takers.iter().map(|(_, slot, _)| *slot)
     }
 
+    /// Frames that take something over have got other numbers.
+    pub(crate) fn renumber(&mut self, real: impl Fn(FrameId) -> FrameId) {
+        self.takers.iter_mut().for_each(|(id, ..)| *id = real(*id));
+    }
+
     /// The frames that take something over.
     pub fn takers(&self) -> impl Iterator<Item = FrameId> + '_ {
         self.takers.iter().map(|(id, ..)| *id)
@@ -189,8 +194,13 @@ impl Obstacle<'_> {
                     format!(" (a frame of {})", other.requester)
                 };
                 let message = format!("`{mine}` cannot be undone before `{theirs}`{whose}, which {did} {}", touch.slot);
-                let finding = Finding::error(codes::STACK_SHARED, message)
-                    .help(format!("undo `{theirs}` first, or undo down to `{mine}`"));
+                let help = match mine == theirs && frame.group.is_none() {
+                    true => format!(
+                        "`{mine}` was asked for more than once: give it a `group` of its own, so that it takes the place of the one in force"
+                    ),
+                    false => format!("undo `{theirs}` first, or undo down to `{mine}`"),
+                };
+                let finding = Finding::error(codes::STACK_SHARED, message).help(help);
                 Hindrance { by: Some(other.id), finding }
             }
         }

@@ -124,18 +124,18 @@ impl World {
             });
         let there = match claims.replaces(id, id) {
             true => 0,
-            false => visits.count() + coming.filter(|request| same(Ask::Apply(id), request)).count(),
+            false => visits.count() + coming.filter(|request| same(Ask::Apply(id), request) && !request.gone).count(),
         };
         let undos = undos.filter(|undo| same(Ask::UndoOf(id), undo) && !undo.gone);
         undos.skip(there).for_each(|undo| undo.gone = true);
     }
 
     /// An undo by leaving a state was not carried out: its frame stays, and is one like others. Frames that are being undone
-    /// (`held`) are those of visits before.
-    pub fn stays(&mut self, undo: &Request, held: &[FrameId]) {
-        if let Some(frame) = self.left_with(undo, held) {
-            self.stack.unscope(frame);
-        }
+    /// (`held`) are those of visits before. False: there is none.
+    pub fn stays(&mut self, undo: &Request, held: &[FrameId]) -> bool {
+        let frame = self.left_with(undo, held);
+        frame.into_iter().for_each(|frame| self.stack.unscope(frame));
+        frame.is_some()
     }
 
     /// All coordinators of a subsystem are down. True: nothing of it is there any more, and what was in force of it is not. `busy`: see

@@ -221,3 +221,38 @@ fn what_a_state_left_behind_goes_on_the_way_down() {
         assert_eq!((ran.code, ran.out.contains("build.undo.failed")), (0, false), "{}{}", ran.out, ran.err);
     }
 }
+
+/// What is safe as well, where its coordinator has left it and something else that is safe came in between: also before it was there.
+#[test]
+fn what_is_safe_and_was_left_goes_on_the_way_down() {
+    let demo = Demo::new();
+    let text = |file: &str| {
+        std::fs::read_to_string(format!("{}/examples/conveyor/{file}", env!("CARGO_MANIFEST_DIR"))).unwrap()
+    };
+    for file in ["conveyor.yaml", "configurations.yaml", "coordinator.yaml"] {
+        demo.write(file, &text(file));
+    }
+    demo.replace("configurations.yaml", "  hold:\n", "  clamp:\n    safe: true\n    group: clamps\n    changes: [{ operation_call: { operation: belt.brake } }]\n  hold:\n");
+    demo.replace("configurations.yaml", "      - operation_call: { operation: belt.brake }\n", "");
+    demo.replace("coordinator.yaml", "    left: {}\n", "    left: {}\n    clamped: { config: clamp }\n");
+    demo.replace(
+        "coordinator.yaml",
+        "    - { src: held, tgt: held, events: [e_stop] }\n",
+        "    - { src: held, tgt: held, events: [e_stop] }\n    - { src: held, tgt: clamped, events: [e_clamp] }
+    - { src: clamped, tgt: held, events: [e_stop] }\n    - { src: clamped, tgt: failed, events: [e_reset, clamp.failed, clamp.broken] }
+    - { src: clamped, tgt: down, events: [e_end] }\n",
+    );
+    for between in [1.0, 0.01] {
+        let script = format!(
+            "fault('port_write belt.speed', 'slow', 9, 0.2) fault('operation_call belt.brake', 'slow', 9, 0.1)
+             deploy('conveyor.yaml') wait(0.5)
+             raise('e_stop') wait({between}) raise('e_clamp') wait({between})
+             raise('e_stop') wait(0.05) raise('e_stop') wait(2)
+             shutdown()"
+        );
+        demo.write("s.lua", &script);
+        let ran = demo.run(&["run", "s.lua", "--clock", "simulated"]);
+        assert!(ran.out.contains("clamp.undo.failed"), "{between}: {}{}", ran.out, ran.err);
+        assert_eq!((ran.code, ran.out.contains("build.undo.failed")), (0, false), "{between}: {}{}", ran.out, ran.err);
+    }
+}

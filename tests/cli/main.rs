@@ -21,6 +21,7 @@ mod force;
 mod foreground;
 mod foreign;
 mod guides;
+mod held_beside;
 mod held_twice;
 mod hierarchy;
 mod hot_swap;

@@ -6,6 +6,7 @@ mod calls;
 mod cancelling;
 mod conformance;
 mod flow;
+mod gripper;
 mod injecting;
 mod monitors;
 #[path = "../support/names.rs"]

@@ -260,6 +260,51 @@ fn what_is_no_word_of_scxml_is_told() {
     assert!(matches!(&found[..], [one] if one.starts_with("warning scxml::priority 3:15")), "{found:?}");
 }
 
+/// What SCXML forbids, or says nothing of.
+#[test]
+fn what_scxml_forbids_is_told() {
+    let to = |event: &str| format!("<transition {event} target=\"b\"/>");
+    for (body, words) in [
+        (
+            format!("<state id=\"a\">{}</state><final id=\"b\">{}</final>", to("event=\"e\""), to("event=\"f\"")),
+            "`final` has no transitions",
+        ),
+        (format!("<state id=\"a\">{}</state><state id=\"b\"/>", to("event=\"\"")), "`event` is empty"),
+        (
+            format!("<state id=\"a\"><initial>{}</initial><state id=\"b\"/></state>", to("event=\"e\"")),
+            "the transition in `initial` waits for nothing",
+        ),
+        (
+            format!("<state id=\"a\" initial=\"b\"><initial>{}</initial><state id=\"b\"/></state>", to("")),
+            "`state` has `initial` twice",
+        ),
+        (
+            "<state id=\"a\" d:confg=\"slow\" xmlns:d=\"OURS\"/>".replace("OURS", print::scxml::OURS),
+            "there is no attribute `davit:confg`",
+        ),
+        (
+            "<state id=\"a\"><d:config xmlns:d=\"OURS\"/></state>".replace("OURS", print::scxml::OURS),
+            "there is no element `davit:config`",
+        ),
+    ] {
+        let found = findings(&document(&body));
+        assert!(matches!(&found[..], [one] if one.contains(words)), "{body}: {found:?}");
+    }
+    let found = findings(&document("<state id=\"a\"/>").replace("1.0", "2.0"));
+    assert!(matches!(&found[..], [one] if one.contains("`version`")), "{found:?}");
+}
+
+/// An event that a state sends itself later, and that others wait for, comes from elsewhere as well.
+#[test]
+fn what_is_sent_later_may_come_before() {
+    let body = "<state id=\"a\"><onentry><send event=\"o\" id=\"t\" delay=\"5s\"/></onentry><onexit><cancel sendid=\"t\"/></onexit>
+        <transition event=\"o\" target=\"b\"/></state><state id=\"b\">BACK</state>";
+    let back = "<transition event=\"o\" target=\"a\"/>";
+    assert_eq!(play(&body.replace("BACK", back), &["o", "o"]).last().unwrap().0, "root.a");
+    // By time alone where nobody else does.
+    assert_eq!(play(&body.replace("BACK", ""), &["o"])[0].0, "root.a");
+}
+
 /// `root` is the name of the outermost state here, and nobody's in SCXML.
 #[test]
 fn a_state_may_be_called_root() {

@@ -83,11 +83,11 @@ impl ScriptFaults {
         self.waiting.iter().try_for_each(|fault| fits(fault, checked))
     }
 
-    /// The in-ports of the components of a type, as the deployment that is up has it.
-    pub(super) fn in_ports(&self, ty: TypeName) -> Vec<Ident> {
+    /// The ports of one direction of the components of a type, as the deployment that is up has it.
+    pub(super) fn ports(&self, ty: TypeName, direction: Direction) -> Vec<Ident> {
         let known = self.up.as_ref().and_then(|(checked, _)| checked.catalogue.get(ty));
         let ports = known.iter().flat_map(|ty| &ty.ports);
-        ports.filter(|(_, port)| port.direction == Direction::In).map(|(name, _)| *name).collect()
+        ports.filter(|(_, port)| port.direction == direction).map(|(name, _)| *name).collect()
     }
 
     /// Whether the components of the deployment that is up are imitated, and do nothing by themselves.

@@ -3,7 +3,7 @@
 use super::options::OptionFields;
 use super::{SharedHost, error, session, values};
 use crate::model::finding::did_you_mean;
-use crate::model::{ComponentName, ComponentSnapshot, Ident, MemberRef, RunState, Snapshot};
+use crate::model::{ComponentName, ComponentSnapshot, Direction, Ident, MemberRef, RunState, Snapshot};
 use mlua::{Lua, Table, Value as LuaValue};
 use serde_json::{Value as Json, json};
 
@@ -69,11 +69,14 @@ pub(super) fn port(host: &SharedHost, lua: &Lua, text: &str) -> mlua::Result<Lua
         return values::to_lua(lua, value);
     }
     let ty = component(&system, name.component)?.ty;
-    let ins = host.borrow().faults.in_ports(ty);
+    let ins = host.borrow().faults.ports(ty, Direction::In);
     if ins.contains(&name.member) {
         return Ok(LuaValue::Nil);
     }
-    let help = did_you_mean(name.member.as_str(), "in-ports", ins.iter().map(Ident::as_str));
+    let help = match host.borrow().faults.ports(ty, Direction::Out).contains(&name.member) {
+        true => format!("it is an out-port, and `signal(\"{name}\")` is what it carries now"),
+        false => did_you_mean(name.member.as_str(), "in-ports", ins.iter().map(Ident::as_str)),
+    };
     Err(error(format!("`{}` has no in-port `{}`: {help}", name.component, name.member)))
 }
 

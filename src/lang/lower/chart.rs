@@ -195,6 +195,13 @@ fn reference(cx: &mut Cx, fields: &mut Fields, key: &'static str) -> Option<(Str
     // That it is missing is told where the chart is compiled, with what it would have to be.
     let node = fields.take_entry(key)?.value;
     let place = cx.place(&node);
+    if matches!(node.kind, Kind::List(_)) {
+        let message = format!("`{key}` must be one state, this is {}", node.describe());
+        cx.report(Finding::error(codes::TEXT_WRONG_TYPE, message).at(place).labelled("expected a text").help(
+            "write a transition for each, or put these states into one around them, and write that: a transition of a state serves for all inside",
+        ));
+        return None;
+    }
     text(cx, &node, &format!("`{key}`"), fields.row(key).example).map(|text| (text, place))
 }
 

@@ -75,6 +75,7 @@ pub fn read(cx: &mut Cx, reading: Reading) -> Option<Statechart> {
         finals: FxHashMap::default(),
         ours: false,
         names: EventNames::default(),
+        elsewhere: FxHashSet::default(),
         again: BTreeMap::new(),
     };
     reader.document(document.root_element())
@@ -93,6 +94,8 @@ struct ScxmlReader<'c, 't> {
     ours: bool,
     /// All names of events, in documents of others.
     names: EventNames,
+    /// Events that come from elsewhere than from the time that a state sends them at.
+    elsewhere: FxHashSet<String>,
     /// Connectors that leave a state and enter it again, by the full name of the state.
     again: BTreeMap<String, String>,
 }
@@ -146,7 +149,9 @@ impl<'t> ScxmlReader<'_, 't> {
             self.ids.insert(ROOT.to_owned(), ROOT.to_owned());
         }
         self.name_all(top, ROOT);
+        self.misspelt(root);
         if !self.ours {
+            self.elsewhere = strange::from_elsewhere(root);
             self.names = EventNames::of(root);
             self.strange(root);
         }

@@ -46,6 +46,9 @@ const NONE: &[(&str, &str, &str)] = &[
     ("cancel", "sendidexpr", "name what is taken back: `sendid=\"…\"`"),
 ];
 
+/// What is written beside SCXML in its own namespace, so that a chart comes back as it was.
+const OWN: &[&str] = &["semantics", "kind", "config", "doo", "done", "timer", "event", "function", "pn", "order"];
+
 /// The namespace of what Qt's editor notes, also in transitions.
 const QT: &str = "http://www.qt.io/2015/02/scxml-ext";
 
@@ -67,7 +70,59 @@ impl<'t> ScxmlReader<'_, 't> {
         }
     }
 
+    /// The same for what is written beside SCXML by this program.
+    pub(super) fn misspelt(&mut self, root: Element<'_, 't>) {
+        for element in root.descendants().filter(Element::is_element) {
+            let own = element.attributes().filter(|attribute| attribute.namespace() == Some(OURS));
+            for attribute in own.filter(|attribute| !OWN.contains(&attribute.name())) {
+                let (key, help) = (attribute.name(), did_you_mean(attribute.name(), "attributes", OWN.iter().copied()));
+                self.report(element, codes::TEXT_UNKNOWN_KEY, format!("there is no attribute `davit:{key}`"), &help);
+            }
+            if element.tag_name().namespace() == Some(OURS) {
+                let message = format!("there is no element `davit:{}`", element.tag_name().name());
+                self.report(
+                    element,
+                    codes::TEXT_UNKNOWN_KEY,
+                    message,
+                    "what is of `davit:` are attributes: leave it out",
+                );
+            }
+        }
+    }
+
+    /// What SCXML forbids, or says nothing of.
+    fn forbidden(&mut self, element: Element<'_, 't>) {
+        let name = element.tag_name().name();
+        let around = element.parent_element();
+        let inside = |of: &str| around.is_some_and(|around| around.has_tag_name((SCXML, of)));
+        if name == "transition" && inside("final") {
+            let help = "make it a `state`, or lead on from the state around it by `done.state.…`";
+            self.report(element, codes::TEXT_BAD_VALUE, "`final` has no transitions: with it all ends there", help);
+        } else if name == "transition" && inside("initial") && element.attribute("event").is_some() {
+            let help = "leave `event` out: it is taken when the state is entered";
+            self.report(element, codes::TEXT_BAD_VALUE, "the transition in `initial` waits for nothing", help);
+        } else if name == "transition" && element.attribute("event").is_some_and(|event| event.trim().is_empty()) {
+            let help = "name the event, or leave `event` out: then it is taken at once";
+            self.report(element, codes::TEXT_BAD_VALUE, "`event` is empty", help);
+        }
+        let twice = element.attribute("initial").is_some()
+            && element.children().any(|child| child.has_tag_name((SCXML, "initial")));
+        if twice {
+            let message = format!("`{name}` has `initial` twice, as an attribute and as an element");
+            self.report(element, codes::TEXT_DUPLICATE_KEY, message, "leave one of them out");
+        }
+        if name == "scxml" && element.attribute("version").is_some_and(|version| version != "1.0") {
+            self.report(
+                element,
+                codes::TEXT_BAD_VALUE,
+                "there is no other `version` than 1.0",
+                "write `version=\"1.0\"`",
+            );
+        }
+    }
+
     fn attributes(&mut self, element: Element<'_, 't>) {
+        self.forbidden(element);
         let name = element.tag_name().name();
         let Some((_, known)) = ATTRIBUTES.iter().find(|(of, _)| *of == name) else { return };
         for attribute in element.attributes().filter(|attribute| attribute.namespace().is_none()) {
@@ -191,6 +246,20 @@ impl<'t> ScxmlReader<'_, 't> {
         }
         taken
     }
+}
+
+/// Events that a state waits for which does not send them itself later: these come from elsewhere.
+pub(super) fn from_elsewhere(root: Element<'_, '_>) -> FxHashSet<String> {
+    let mut events = FxHashSet::default();
+    for transition in root.descendants().filter(|element| element.has_tag_name((SCXML, "transition"))) {
+        let Some(state) = transition.parent_element() else { continue };
+        let sends = inside(state, "onentry").into_iter().flat_map(|block| inside(block, "send"));
+        let later: FxHashSet<&str> =
+            sends.filter(|send| send.attribute("delay").is_some()).filter_map(|send| send.attribute("event")).collect();
+        let heard = transition.attribute("event").unwrap_or_default().split_whitespace();
+        events.extend(heard.filter(|event| !later.contains(event)).map(str::to_owned));
+    }
+    events
 }
 
 /// The elements of SCXML of this name right in another one.

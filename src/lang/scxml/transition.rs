@@ -125,7 +125,10 @@ impl<'t> ScxmlReader<'_, 't> {
     ) {
         if let Some(seconds) = delays.get(event).filter(|_| !exact) {
             out.events.push((Trigger::timed(Since::Entry, *seconds), out.origin));
-            return;
+            // What others wait for as well may come before its time.
+            if !self.elsewhere.contains(event) {
+                return;
+            }
         }
         if let Some(id) = event.strip_prefix("done.state.").filter(|_| !exact) {
             let finals = self.finals.get(id).cloned().unwrap_or_default();
