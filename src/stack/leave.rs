@@ -3,8 +3,9 @@
 //!
 //! An operator may have put something on top of what a coordinator has applied; while everything is being stopped nobody is
 //! there who would take that away again. And what a state brought with it may be in force though that was left: something safe
-//! came while it was to be undone, or that failed. The coordinator's chart has no place from where it would be asked for again. So it goes first, newest first, in one transaction with the undo that was asked for:
-//! both or none. What is `safe`, and what would move, is nobody's to take along.
+//! came while it was to be undone, or that failed. The coordinator's chart has no place from where it would be asked for again. So it goes
+//! first, newest first, in one transaction with the undo that was asked for: both or none. What an operator has made `safe`, and what would
+//! move, is nobody's to take along.
 
 use super::claims::{Claim, Claims};
 use super::request::{Batch, LedDown, Request, Requester, Why};

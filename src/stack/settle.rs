@@ -144,12 +144,17 @@ impl World {
     /// [`Stack::apply`]: super::Stack::apply
     pub fn settle_safe(
         &mut self,
-        edits: Edits,
+        mut edits: Edits,
         frame: Frame,
         end: &SafeEnd<'_>,
         busy: &[FrameId],
     ) -> (FrameId, Verdict) {
         let broken = end.failed.is_some();
+        if broken && !end.interrupts {
+            // What was done of it says nothing of what it was to take the place of, of the same: that is still so.
+            let same = |id: FrameId| self.stack.frame(id).is_some_and(|old| old.configuration == frame.configuration);
+            edits.pops.retain(|(id, _)| !same(*id));
+        }
         let frame = match end.failed {
             None => frame,
             Some(done) if !end.interrupts => Frame { partial: true, ..done.cloned().unwrap_or(frame) },

@@ -112,3 +112,32 @@ fn nothing_is_squashed_for_two_of_a_group_of_which_one_goes() {
         raise('e_stop') wait(0.05) raise('e_stop') wait(2) told('held')";
     says(&demo, script, &["held: build run slow hold speed 0.0 k 3.0"]);
 }
+
+/// One that is asked for anew and fails in part: what the first had done is taken back with what was done of the second.
+#[test]
+fn one_that_fails_when_it_is_asked_for_anew_takes_the_first_ones_place() {
+    let demo = conveyor(
+        "  slow: { changes: [{ port_write: { port: belt.speed, value: 0.1 } }], group: a }
+  hold:
+    group: a
+    safe: true
+    changes: [{ property_set: { property: belt.k, value: 0.5 } }, { operation_call: { operation: belt.brake } }]
+",
+    );
+    for between in [0.02, 1.0] {
+        let script = format!(
+            "fault('operation_call belt.brake', 'slow', 1, 0.2)
+             deploy('conveyor.yaml') wait(0.5)
+             raise('e_stop') wait({between}) fault('operation_call belt.brake', 'fail', 1) raise('e_stop') wait(1)
+             raise('e_end') wait(1)
+             local released = 0
+             for _, it in ipairs(log()) do
+               for _, step in ipairs(it.steps or {{}}) do
+                 if step.step == 'operation_call belt.release' and step.outcome == 'done' then released = released + 1 end
+               end
+             end
+             say('released ' .. released)"
+        );
+        says(&demo, &script, &["released 1"]);
+    }
+}
