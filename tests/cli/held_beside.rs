@@ -3,6 +3,14 @@
 
 use crate::demo::Demo;
 
+/// A mode, and what is safe, of one group.
+const HOLD: &str = "  slow: { changes: [{ port_write: { port: belt.speed, value: 0.1 } }], group: a }
+  hold:
+    group: a
+    safe: true
+    changes: [{ property_set: { property: belt.k, value: 0.5 } }, { operation_call: { operation: belt.brake } }]
+";
+
 /// The conveyor of the examples with a gain `k`, and these configurations beside `build` and `run`.
 fn conveyor(configurations: &str) -> Demo {
     let demo = Demo::new();
@@ -35,15 +43,8 @@ fn says(demo: &Demo, script: &str, said: &[&str]) {
 /// One of another group writes the same in between: what the first has saved is handed to that one, also while both are being applied.
 #[test]
 fn one_of_another_group_in_between_keeps_its_value() {
-    let demo = conveyor(
-        "  slow: { changes: [{ port_write: { port: belt.speed, value: 0.1 } }], group: a }
-  hold:
-    group: a
-    safe: true
-    changes: [{ property_set: { property: belt.k, value: 0.5 } }, { operation_call: { operation: belt.brake } }]
-  hold2: { group: b, safe: true, changes: [{ property_set: { property: belt.k, value: 3.0 } }] }
-",
-    );
+    let other = "  hold2: { group: b, safe: true, changes: [{ property_set: { property: belt.k, value: 3.0 } }] }\n";
+    let demo = conveyor(&format!("{HOLD}{other}"));
     for between in [0.01, 1.0] {
         let script = format!(
             "fault('operation_call belt.brake', 'slow', 9, 0.05)
@@ -116,14 +117,7 @@ fn nothing_is_squashed_for_two_of_a_group_of_which_one_goes() {
 /// One that is asked for anew and fails in part: what the first had done is taken back with what was done of the second.
 #[test]
 fn one_that_fails_when_it_is_asked_for_anew_takes_the_first_ones_place() {
-    let demo = conveyor(
-        "  slow: { changes: [{ port_write: { port: belt.speed, value: 0.1 } }], group: a }
-  hold:
-    group: a
-    safe: true
-    changes: [{ property_set: { property: belt.k, value: 0.5 } }, { operation_call: { operation: belt.brake } }]
-",
-    );
+    let demo = conveyor(HOLD);
     for between in [0.02, 1.0] {
         let script = format!(
             "fault('operation_call belt.brake', 'slow', 1, 0.2)
