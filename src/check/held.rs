@@ -69,7 +69,7 @@ impl Worlds<'_> {
     ) -> Went {
         let (Some(before), Some(planned)) = (self.get(id), self.get(planned)) else { return Went::to(id) };
         // Others may have come since, above it; but none that was not there then.
-        let was = undos.filter(|undo| planned.of_visit(undo).is_some());
+        let was = undos.filter(|undo| planned.let_go_by(undo).is_some());
         let stay: SmallVec<[FrameId; 2]> = was.filter_map(|undo| before.left_with(&undo, held)).collect();
         self.unscoped(id, &stay)
     }
@@ -78,7 +78,7 @@ impl Worlds<'_> {
     pub(super) fn unscoped(&mut self, id: WorldId, stay: &[FrameId]) -> Went {
         let Some(before) = self.get(id).filter(|_| !stay.is_empty()) else { return Went::to(id) };
         let mut world = before.clone();
-        stay.iter().for_each(|frame| world.stack.unscope(*frame));
+        stay.iter().for_each(|frame| world.stack.let_go(*frame));
         self.went(id, world, self.system(id), &[])
     }
 

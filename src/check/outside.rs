@@ -202,16 +202,9 @@ impl Product<'_> {
         if heard.contains(&at) || state.stopping || !self.minds_stopping || self.all_are_down(state) {
             return;
         }
-        let leaving = state.leaving || self.minds_leaving();
-        let next = ProductState { stopping: true, leaving, ..state.clone() };
+        let next = ProductState { stopping: true, leaving: true, ..state.clone() };
         let by = Move::Dropped(u16::try_from(at).unwrap_or(u16::MAX));
         nexts.all.push(Next::plain(by, next, Failed::Nothing));
-    }
-
-    /// Whether something may be in force that nobody asks for any more, and that is taken along while it is led down: what an operator
-    /// has applied, or what a state has brought with it.
-    fn minds_leaving(&self) -> bool {
-        self.tells_all || !self.operator.is_empty() || self.is_scoped
     }
 
     /// An event comes to all that wait for it.
@@ -220,7 +213,7 @@ impl Product<'_> {
         next.stopping |= name == self.deployment.shutdown.event && self.minds_stopping;
         // Somebody wants it up again.
         next.stopping &= name != self.deployment.deploy.event;
-        next.leaving |= name == self.deployment.shutdown.event && self.minds_leaving();
+        next.leaving |= name == self.deployment.shutdown.event;
         self.confirm(&mut next, name);
         let hearers = self.hearers(&next, name, None);
         // If one alone hears it, there is nothing to wait for, unless more may come before it does.

@@ -81,8 +81,6 @@ pub struct Product<'a> {
     /// It is kept that the deployment is being stopped. Of several coordinators without an operator it is kept for long, until
     /// all are down, and makes many states: only where these are few.
     pub minds_stopping: bool,
-    /// Whether a state brings a configuration with it.
-    pub is_scoped: bool,
     /// What an operator's safe configuration leads to is followed: only where that is easy.
     pub follows_by_hand: bool,
     /// It is said already that the shutdown does not reach *down*.
@@ -141,7 +139,6 @@ impl<'a> Product<'a> {
         let operator = coupling::operated(deployment, catalogue, charts, numbers);
         let losable = deployment.configurations.iter().map(|c| (c.id, c.holds.is_some()));
         let losable = losable.filter(|(id, holds)| *holds || hears_loss(charts, numbers, *id)).collect();
-        let is_scoped = members.iter().any(|member| member.chart.raises().iter().any(|site| site.scoped));
         let minds_stopping = !operator.is_empty() || members.len() == 1;
         let mut product = Self {
             deployment,
@@ -164,7 +161,6 @@ impl<'a> Product<'a> {
             losable,
             tells_all: false,
             minds_stopping,
-            is_scoped,
             follows_by_hand: false,
             never_down: false,
             standing: super::stands::standing(deployment),

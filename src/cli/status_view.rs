@@ -68,6 +68,10 @@ fn own(out: &Output, status: &Json, part: &FilePart<'_>, known: bool) -> String 
         let still = stopping.stands_still().map(|still| format!(": stands still, {still}")).unwrap_or_default();
         line(format!("stopping     {}{still}", stopping.stage.words()));
     }
+    if top && status["left"].is_array() {
+        let told = "its coordinators are down, and components are there: `davit shutdown` takes them away";
+        line(format!("left         {}", out.paint(Style::Bad, told)));
+    }
     if !part.waiting.is_empty() {
         line(format!("waiting for  {}", part.waiting.join(", ")));
     }

@@ -206,7 +206,7 @@ impl Engine {
         let spec = self.spec(&planned, false);
         let mut machine = Transaction::new(planned, spec);
         machine.resume(sent, outcome, &mut self.world.system);
-        let visit = (undoing && request.scope.is_some()).then_some(switch.frame().id);
+        let visit = (undoing && request.lets_go_of(switch.frame())).then_some(switch.frame().id);
         let places = SmallVec::from_iter([0]);
         let group = Group { takes: 1, places, visits: SmallVec::from_iter([visit]), ..Group::default() };
         let purpose = Purpose::Requests(number, group);

@@ -46,6 +46,8 @@ impl Engine {
         match self.repair(at, By::Request(number)) {
             Ok(()) => true,
             Err(residual) => {
+                let held = self.held_frames();
+                self.world.stays(&request, &held);
                 self.answer(request, Verdict::UndoBroken, Some(Reason::Broken(residual)));
                 false
             }

@@ -6,7 +6,7 @@
 use super::engine::Engine;
 use super::request::{Reason, Request};
 use super::running::{Purpose, Running};
-use super::safety::coming;
+use super::safety::{Troubled, coming};
 use crate::model::{Ask, ComponentName, ConfigId, Step, Target, Verdict};
 use crate::stack::{BestEffort, Frame, Planned, Residual, SafeEnd, Stack, effort};
 use crate::system::touch::{Slot, slot};
@@ -84,7 +84,7 @@ impl Engine {
         planned.popped.iter().for_each(|frame| touched.takes_place_of(frame));
         touched.leaves(&frame);
         touched.planned_at(self.world.system.revision());
-        self.safety.troubles.push((request.id, troubles));
+        self.safety.troubles.push(Troubled { request: request.id, reasons: troubles, missed: Vec::new() });
         let spec = Spec { asked_back: false, ..self.effort([configuration.id]) };
         let purpose = Purpose::Safe(Box::new((request, frame, touched)));
         let machine = Transaction::new(planned, spec);
@@ -199,10 +199,11 @@ impl Engine {
         machine.note_done(&mut touched);
         // Also if it comes no further: what was interrupted heeds it. Calls are kept by its frame alone.
         self.safety.touched.join(touched.without_calls());
-        let missed: Vec<Step> = machine.missed().cloned().collect();
+        let mut missed: Vec<Step> = machine.missed().cloned().collect();
         let edits = self.safety.settled(machine.planned().parts[0].edits.clone());
         let end = machine.end();
-        let mut troubles = self.safety.troubles_of(request.id);
+        let (mut troubles, missed_before) = self.safety.troubles_of(request.id);
+        missed.extend(missed_before);
         let mut broken = None;
         if let Some(PartEnd::Broken(part)) = end.parts.into_iter().next() {
             broken = Some(part);
@@ -222,8 +223,9 @@ impl Engine {
             // Those that came later took what this one was to do for done.
             let later = self.running.iter().filter(|other| other.after.contains(&number));
             let served: Vec<_> = later.flat_map(|other| other.serves.iter().copied()).collect();
-            for (_, troubles) in self.safety.troubles.iter_mut().filter(|(id, _)| served.contains(id)) {
-                troubles.push(Reason::Broken(part.residual.clone()));
+            for troubled in self.safety.troubles.iter_mut().filter(|other| served.contains(&other.request)) {
+                troubled.reasons.push(Reason::Broken(part.residual.clone()));
+                troubled.missed.extend(missed.iter().cloned());
             }
         }
         let reason = match broken {

@@ -1,7 +1,7 @@
 //! What is known of safe configurations beside their transactions.
 
 use super::request::{Reason, Request};
-use crate::model::RequestId;
+use crate::model::{RequestId, Step};
 use crate::stack::{Edits, FrameId};
 use crate::transaction::Touched;
 use std::collections::VecDeque;
@@ -11,12 +11,21 @@ use std::collections::VecDeque;
 pub(super) struct Safety {
     /// Requests that have come and were not begun.
     pub waiting: VecDeque<Request>,
-    /// What those under way could not plan.
-    pub troubles: Vec<(RequestId, Vec<Reason>)>,
+    /// What those under way could not plan, and what others before them were to do for them and did not.
+    pub troubles: Vec<Troubled>,
     /// What those that have ended touched, and what was interrupted was not told yet.
     pub touched: Touched,
     /// The frames of those that have ended, by the numbers under which they were under way: those that came after may take their places.
     pub pushed: Vec<(u64, FrameId)>,
+}
+
+/// A safe configuration under way of which not everything is done.
+#[derive(Debug)]
+pub(super) struct Troubled {
+    pub request: RequestId,
+    pub reasons: Vec<Reason>,
+    /// The steps that others were to do for it.
+    pub missed: Vec<Step>,
 }
 
 /// Frames of safe configurations that are being applied have numbers from here on, by which those that come after know them.
@@ -42,9 +51,9 @@ impl Safety {
         edits
     }
 
-    /// What one that is over could not plan.
-    pub fn troubles_of(&mut self, request: RequestId) -> Vec<Reason> {
-        let at = self.troubles.iter().position(|(id, _)| *id == request);
-        at.map(|at| self.troubles.remove(at).1).unwrap_or_default()
+    /// What one that is over could not plan, and what was not done for it.
+    pub fn troubles_of(&mut self, request: RequestId) -> (Vec<Reason>, Vec<Step>) {
+        let at = self.troubles.iter().position(|troubled| troubled.request == request);
+        at.map(|at| self.troubles.remove(at)).map(|troubled| (troubled.reasons, troubled.missed)).unwrap_or_default()
     }
 }

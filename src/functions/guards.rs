@@ -60,7 +60,7 @@ pub fn install(lua: &Lua, native: &Table, bytes: usize, time: Duration) -> Resul
 }
 
 /// Replaces the functions of a state's libraries that loop where nothing is counted: `charge` is called with a number of
-/// elements before they are gone through, and raises an error when they are too many.
+/// elements before they are gone through, and raises an error when they are too many. `pairs` keeps an order.
 ///
 /// # Errors
 /// When Lua has no memory for it.
@@ -68,7 +68,8 @@ pub fn loops(lua: &Lua, charge: &Function) -> Result<()> {
     let globals = lua.globals();
     let library = |name: &str| globals.raw_get::<Value>(name);
     let arguments = (charge, library("string")?, library("table")?, library("utf8")?);
-    let tonumber: Function = compiled(lua)?.call(arguments)?;
+    let (tonumber, pairs): (Function, Function) = compiled(lua)?.call(arguments)?;
+    globals.raw_set("pairs", pairs)?;
     globals.raw_set("tonumber", tonumber)
 }
 

@@ -185,6 +185,22 @@ impl Session {
         Err((panic, ended.ok()))
     }
 
+    /// Where it is in its life, as people are shown it, and what is left where its coordinators are down and something is there all the
+    /// same (what was found was accepted as it is): that is not *down*.
+    pub(super) fn phase_of(&self, broken: bool, system: Option<&Snapshot>) -> (Phase, Vec<String>) {
+        let phase = match self.hub().phase() {
+            Phase::Up | Phase::Deploying if broken => Phase::Broken,
+            // Its coordinator leads down, whoever raised the event: nobody stops it for that.
+            Phase::Up if self.configurator().is_leaving() => Phase::ShuttingDown,
+            Phase::Up if self.is_down() => match system.map_or_else(Vec::new, |system| leftovers(system, &[])) {
+                left if left.is_empty() => Phase::Down,
+                left => return (Phase::Broken, left),
+            },
+            phase => phase,
+        };
+        (phase, Vec::new())
+    }
+
     pub(super) fn finish(&self, stage: Stage, forced: Vec<String>) -> Ended {
         self.detach_coordinators();
         let left = self.left_over();

@@ -311,6 +311,9 @@ pub struct StatusView {
     pub stack: Option<Vec<FrameStatus>>,
     /// What is left of an application that is neither done nor undone; empty unless it is broken.
     pub residual: Option<Vec<Difference>>,
+    /// What is there though all coordinators are down; without it left out.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub left: Vec<String>,
     /// What is wrong.
     pub faults: Vec<ComponentFault>,
     /// Requests that are not answered yet.

@@ -323,20 +323,16 @@ impl Session {
         let view = known.as_ref().map(Option::as_deref);
         let frames = view.map(|view| view.map_or(&[][..], |view| &view.stack));
         let broken = view.flatten().is_some_and(|view| view.broken.is_some());
-        let phase = match self.hub.phase() {
-            Phase::Up | Phase::Deploying if broken => Phase::Broken,
-            // Its coordinator leads down, whoever raised the event: nobody stops it for that.
-            Phase::Up if self.configurator().is_leaving() => Phase::ShuttingDown,
-            Phase::Up if self.is_down() => Phase::Down,
-            phase => phase,
-        };
+        let system = view.map(|view| view.and_then(|view| view.system.as_deref().cloned()).unwrap_or_default());
+        let (phase, left) = self.phase_of(broken, system.as_ref());
         StatusView {
             name: self.deployment.name.to_string(),
             phase,
             coordinator: self.parts[0].coordinator.active(),
             coordinators: self.active(),
             subsystems: self.junction.subsystems().map_or_else(Vec::new, Subsystems::view),
-            system: view.map(|view| view.and_then(|view| view.system.as_deref().cloned()).unwrap_or_default()),
+            system,
+            left,
             stack: frames.map(|frames| frames.iter().map(|frame| FrameStatus::of(frame, &self.deployment)).collect()),
             residual: view.map(|view| view.map_or_else(Vec::new, Difference::of_view)),
             faults: self.hub.faults(),

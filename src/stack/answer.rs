@@ -120,7 +120,7 @@ pub enum Reason {
 pub struct TakenAlong {
     /// Its configuration.
     pub configuration: ConfigId,
-    /// It is of a state of the coordinator that was left; else an operator's.
+    /// A coordinator had let go of it, and its undo had failed; else an operator's.
     pub left: bool,
 }
 
@@ -338,10 +338,10 @@ impl fmt::Display for Reason {
                 let of = |left: bool, whose: &str| {
                     let ids = frames.iter().filter(|frame| frame.left == left);
                     let ids: Vec<String> = ids.map(|frame| format!("`{}`", frame.configuration)).collect();
-                    let told = format!("{} of {whose} was undone with it, since it stood in its way", ids.join(", "));
+                    let told = format!("{}{whose} was undone with it, since it stood in its way", ids.join(", "));
                     (!ids.is_empty()).then_some(told)
                 };
-                let told = [of(false, "an operator"), of(true, "a state that was left")];
+                let told = [of(false, " of an operator"), of(true, ", whose undo had failed before,")];
                 f.write_str(&told.into_iter().flatten().collect::<Vec<_>>().join("; "))
             }
             Self::TakenDown => f.write_str("the system is being taken down"),

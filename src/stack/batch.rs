@@ -117,8 +117,9 @@ pub fn take_up(world: &World, requests: &[Request], rules: &Rules<'_>) -> Group 
                 ResolvedRequest::Commit => group.commits = true,
                 ResolvedRequest::Down => group.down = true,
                 ResolvedRequest::Op(op) => {
-                    let visit = request.ask.is_undo() && request.scope.is_some();
-                    let visit = if let (true, Op::Undo(frame)) = (visit, &op) { Some(*frame) } else { None };
+                    let let_go =
+                        |frame: &FrameId| world.stack.frame(*frame).is_some_and(|frame| request.lets_go_of(frame));
+                    let visit = if let Op::Undo(frame) = &op { Some(*frame).filter(let_go) } else { None };
                     if let (Some(at), Op::Undo(frame)) = (repairs, &op)
                         && let Some(planned) = world.straight(at, *frame, context)
                     {
@@ -183,7 +184,7 @@ fn add(
 fn told(world: &World, requests: &[Request], mut group: Group) -> Group {
     group.told.sort_by_key(|told| told.place);
     let failed = group.told.iter().filter(|told| told.verdict == Some(Verdict::UndoFailed));
-    group.stay = failed.filter_map(|told| Some((told.place, world.of_visit(&requests[told.place])?))).collect();
+    group.stay = failed.filter_map(|told| Some((told.place, world.let_go_by(&requests[told.place])?))).collect();
     group
 }
 

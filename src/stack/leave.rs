@@ -26,9 +26,9 @@ fn takes_along(request: &Request) -> bool {
     request.why == Why::Asked && request.ask.is_undo() && matches!(request.requester, Requester::Coordinator(_))
 }
 
-/// Whether a frame may be one that an undo takes along.
-fn is_loose(frame: &Frame, by: Requester) -> bool {
-    frame.requester == Requester::Operator || frame.left && frame.requester == by
+/// Whether a frame may be one that an undo takes along: nobody asks for it any more.
+fn is_loose(frame: &Frame, led: LedDown) -> bool {
+    frame.requester == Requester::Operator || frame.left && led.is_led_by(frame.requester)
 }
 
 /// What a frame is about that is outside of what is led down.
@@ -42,8 +42,8 @@ impl Stack {
     /// that its coordinator has left, that are about what it is about, and those that are about what these are about. None: there are none.
     pub fn taken_along(&self, batch: &Batch, led: LedDown, claims: &Claims) -> Option<Claim> {
         let own = |request: &Request| takes_along(request) && led.is_led_by(request.requester);
-        let by = batch.requests.iter().find(|request| own(request))?.requester;
-        let loose = self.frames.iter().filter(|frame| is_loose(frame, by) && outside(led, frame).is_none());
+        batch.requests.iter().find(|request| own(request))?;
+        let loose = self.frames.iter().filter(|frame| is_loose(frame, led) && outside(led, frame).is_none());
         let mut open: Vec<Claim> = loose.map(|frame| claims.of_frame(frame)).collect();
         let (mut about, mut along) = (claims.of(&batch.requests), None);
         while let Some(at) = open.iter().position(|frame| frame.meets(&about)) {
@@ -81,7 +81,7 @@ pub(super) fn along(
         let Err(hindrance) = share::look(&rest, at) else { continue };
         let Hindrance { by, finding } = *hindrance;
         let frame = rest.iter().find(|frame| Some(frame.id) == by);
-        let why = match frame.map(|frame| stays(world, request.requester, frame, &rest, (led, repaired))) {
+        let why = match frame.map(|frame| stays(world, frame, &rest, (led, repaired))) {
             Some(None) => None,
             Some(Some(why)) => Some(why),
             None => Some(None),
@@ -111,12 +111,11 @@ pub(super) fn along(
 /// Whether a frame is not taken along from among these, and why, where it could be thought to be.
 fn stays(
     world: &World,
-    by: Requester,
     frame: &Frame,
     frames: &[Arc<Frame>],
     (led, repaired): (LedDown, bool),
 ) -> Option<Option<String>> {
-    if !is_loose(frame, by) {
+    if !is_loose(frame, led) {
         return Some(None);
     }
     if let Some(component) = outside(led, frame) {

@@ -105,7 +105,8 @@ pub struct Frame {
     pub parts: Arc<BTreeSet<Buried>>,
     /// The state of its coordinator that it belongs to, while that is active: such a frame is never squashed.
     pub scope: Option<Scope>,
-    /// The state that it belonged to was left, and it was not undone then: nobody asks for it any more.
+    /// Its coordinator has let go of it (it left the state that this belonged to, or asked for its undo), and it was not undone then: nobody
+    /// may ask for it any more.
     pub left: bool,
     /// It is what was done and not taken back of something that ended *broken*.
     pub partial: bool,
@@ -274,10 +275,10 @@ impl Stack {
         self.safe().any(|safe| is_in_system(safe, component))
     }
 
-    /// The state that a frame belongs to has been left, and the frame stays: from now on it is one like others, but that
-    /// its coordinator takes it along while it leads down.
-    pub fn unscope(&mut self, frame: FrameId) {
-        if let Some(frame) = self.frames.iter_mut().find(|f| f.id == frame && f.scope.is_some()) {
+    /// Its coordinator has let go of a frame, and it stays: from now on it belongs to no state, and is taken along where everything is led
+    /// down.
+    pub fn let_go(&mut self, frame: FrameId) {
+        if let Some(frame) = self.frames.iter_mut().find(|f| f.id == frame && !f.left) {
             let frame = Arc::make_mut(frame);
             (frame.scope, frame.left) = (None, true);
         }
@@ -403,17 +404,19 @@ impl Stack {
         id
     }
 
-    /// Pushes the frame of a safe configuration that has been applied as far as it goes, with what goes with it.
-    pub fn push_safe(&mut self, edits: Edits, frame: Frame, busy: &[FrameId]) -> FrameId {
+    /// Pushes the frame of a safe configuration that has been applied as far as it goes, with what goes with it. Frames of what is `broken`
+    /// are not squashed, but one of their group takes their place.
+    pub fn push_safe(&mut self, edits: Edits, frame: Frame, busy: &[FrameId], broken: &[FrameId]) -> FrameId {
+        let kept: SmallVec<[FrameId; 4]> = busy.iter().chain(broken).copied().collect();
         let push = Some(Arc::new(Frame { safe: true, ..frame }));
         let (bound, waits) = (self.bound, edits.waits);
         // Two of a group are one before they count.
         self.bound = bound.saturating_add(1);
-        let pushed = self.apply([&Edits { push, ..edits }], busy).first().copied().unwrap_or(FrameId(0));
+        let pushed = self.apply([&Edits { push, ..edits }], &kept).first().copied().unwrap_or(FrameId(0));
         self.bound = bound;
         effort::take_over_group(&mut self.frames, pushed, busy);
         if let Some(pile) = self.frame(pushed).map(|frame| frame.pile()) {
-            let busy: SmallVec<[FrameId; 4]> = busy.iter().copied().chain(waits.then_some(pushed)).collect();
+            let busy: SmallVec<[FrameId; 4]> = kept.into_iter().chain(waits.then_some(pushed)).collect();
             let room = squash::Quota { pile, bound, busy: &busy };
             squash::fit(&mut self.frames, room, self.memory.as_ref());
         }
@@ -423,7 +426,7 @@ impl Stack {
     /// How it will be when a safe configuration that is being applied has come to its end, whose frame has this number until then.
     pub fn expecting(&self, edits: Edits, frame: Frame, id: FrameId) -> Self {
         let mut expected = Self { next: id.0, ..self.clone() };
-        expected.push_safe(edits, frame, &[]);
+        expected.push_safe(edits, frame, &[], &[]);
         expected
     }
 

@@ -1,5 +1,6 @@
 //! What is asked of a configurator: requests, who makes them, and which belong together (semantics: *Requests*).
 
+use super::Frame;
 use crate::model::names::is_within;
 use crate::model::words::sent_as_shown;
 use crate::model::{Ask, ComponentName, ConfigId, Finding, Ident, OPERATOR, RequestId, codes};
@@ -117,6 +118,14 @@ impl Request {
             why: Why::Asked,
             tag: (0, 0),
         }
+    }
+
+    /// Whether a coordinator lets go of a frame of that configuration by this undo: by leaving the state that the frame belongs to, or by
+    /// naming one that belongs to none.
+    pub fn lets_go_of(&self, frame: &Frame) -> bool {
+        let coordinator = self.scope.is_some() || matches!(self.requester, Requester::Coordinator(_));
+        let asked = self.why == Why::Asked && !self.gone && coordinator;
+        asked && (frame.scope, frame.requester) == (self.scope, self.requester)
     }
 
     /// An undo by leaving a state is not carried out, and there is no frame of that visit: it is of a safe configuration that is still

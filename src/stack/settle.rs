@@ -67,7 +67,7 @@ pub struct SafeEnd<'f> {
     /// A step of it failed, or what became of one is not known; with the frame of what was done, if that is another one than
     /// was planned.
     pub failed: Option<Option<&'f Frame>>,
-    /// The steps that were not done.
+    /// The steps that were not done, also of those that an earlier one was to do.
     pub missed: &'f [Step],
     /// A piece of it could not even be planned.
     pub left_out: bool,
@@ -156,23 +156,31 @@ impl World {
             edits.pops.retain(|(id, _)| !same(*id));
         }
         let frame = match end.failed {
-            None => frame,
+            None if end.missed.is_empty() => frame,
             Some(done) if !end.interrupts => Frame { partial: true, ..done.cloned().unwrap_or(frame) },
-            // As if what was interrupted had never been.
-            Some(_) => without(frame, end.missed),
+            // As if what was interrupted had never been; what an earlier one was to do and did not is not done either.
+            _ => without(frame, end.missed),
         };
         let verdict = if broken || end.left_out { Verdict::Broken } else { Verdict::Ok };
-        // What is broken is repaired by the undo of its own frame.
-        let broken = self.broken.iter().filter_map(|broken| broken.frame);
-        let busy: Vec<FrameId> = busy.iter().copied().chain(broken).collect();
-        (self.stack.push_safe(edits, frame, &busy), verdict)
+        // What is broken is repaired by the undo of its frame: of the one that takes the place of that.
+        let stack = &self.stack;
+        let there = |frame: &FrameId| stack.frame(*frame).is_some();
+        let broken: Vec<FrameId> = self.broken.iter().filter_map(|broken| broken.frame).filter(there).collect();
+        let pushed = self.stack.push_safe(edits, frame, busy, &broken);
+        let gone: Vec<FrameId> = broken.into_iter().filter(|frame| self.stack.frame(*frame).is_none()).collect();
+        for frame in self.broken.iter_mut().filter_map(|broken| broken.frame.as_mut()) {
+            if gone.contains(frame) {
+                *frame = pushed;
+            }
+        }
+        (pushed, verdict)
     }
 
     /// Frames that were to be undone with the state they belong to stay.
     pub fn keep(&mut self, requests: &[Request], settled: &Settled) {
         for (place, frame) in &settled.stay {
             match frame {
-                Some(frame) => self.stack.unscope(*frame),
+                Some(frame) => self.stack.let_go(*frame),
                 None => _ = self.stays(&requests[*place], &[]),
             }
         }

@@ -339,10 +339,10 @@ fn an_undo_by_leaving_a_state_is_about_the_visit_that_was_left() {
     let mut world = World::new(bench.system.clone(), bench.stack.clone());
     let planned = taken_up(&world, &[undo], &[later], false, None).planned.expect("nothing is in its way");
     assert_eq!(planned.parts[0].edits.pops.iter().map(|(id, _)| *id).collect::<Vec<_>>(), ids[..1]);
-    assert_eq!(world.of_visit(&undo), Some(ids[0]));
+    assert_eq!(world.let_go_by(&undo), Some(ids[0]));
     assert_eq!(world.left_with(&undo, &ids[..1]), Some(ids[1]), "the first is being undone: this is about the next");
     world.stays(&undo, &[]);
-    assert_eq!(world.of_visit(&undo), Some(ids[1]), "what stays of the first is a frame like others");
+    assert_eq!(world.let_go_by(&undo), Some(ids[1]), "what stays of the first is a frame like others");
 }
 
 #[test]

@@ -88,20 +88,22 @@ impl World {
         broken.chain(self.quarantined.iter().copied()).collect()
     }
 
-    /// The frame of the visit that an undo by leaving a state is about; none: it is no such undo, or there is no frame.
-    pub fn of_visit(&self, undo: &Request) -> Option<FrameId> {
+    /// The frame that a coordinator lets go of by an undo: that of the visit whose state is left, or the one that it names; none: nobody's,
+    /// or there is no frame.
+    pub fn let_go_by(&self, undo: &Request) -> Option<FrameId> {
         self.left_with(undo, &[])
     }
 
     /// The same beside frames that are being undone by what is under way.
     pub fn left_with(&self, undo: &Request, held: &[FrameId]) -> Option<FrameId> {
-        let (Ask::UndoOf(id), Some(_)) = (undo.ask, undo.scope) else { return None };
+        let Ask::UndoOf(id) = undo.ask else { return None };
+        let mut frames = self.stack.frames().iter();
         let fits = |frame: &&Arc<super::Frame>| {
-            let of = (frame.scope, frame.configuration, frame.requester);
-            !undo.gone && of == (undo.scope, id, undo.requester) && !held.contains(&frame.id)
+            frame.configuration == id && undo.lets_go_of(frame) && !held.contains(&frame.id)
         };
         // A safe configuration of a later visit may be there already: visits are left in their order.
-        self.stack.frames().iter().find(fits).map(|frame| frame.id)
+        let frame = if undo.scope.is_some() { frames.find(fits) } else { frames.rev().find(fits) };
+        frame.map(|frame| frame.id)
     }
 
     /// A safe configuration comes that a state brings with it. Undos by leaving that state that came before (`undos`, oldest
@@ -130,11 +132,11 @@ impl World {
         undos.skip(there).for_each(|undo| undo.gone = true);
     }
 
-    /// An undo by leaving a state was not carried out: its frame stays, and is one like others. Frames that are being undone
-    /// (`held`) are those of visits before. False: there is none.
+    /// An undo was not carried out by which a coordinator lets go of something: its frame stays, and is one like others. Frames that are
+    /// being undone (`held`) are those of others before. False: there is none.
     pub fn stays(&mut self, undo: &Request, held: &[FrameId]) -> bool {
         let frame = self.left_with(undo, held);
-        frame.into_iter().for_each(|frame| self.stack.unscope(frame));
+        frame.into_iter().for_each(|frame| self.stack.let_go(frame));
         frame.is_some()
     }
 

@@ -288,8 +288,8 @@ fn random_coordinators_are_judged_apart_as_together() {
             (!cut).then_some(report)
         };
         // Of those whose product is large there are enough elsewhere.
-        let Some(apart) = followed(false, 1_000) else { continue };
-        let Some(plain) = followed(true, 30_000) else { continue };
+        let Some(apart) = followed(false, 1_400) else { continue };
+        let Some(plain) = followed(true, 40_000) else { continue };
         compared += 1;
         with_stops += usize::from(stops > 0);
         kinds[joined as usize] += 1;

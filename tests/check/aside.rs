@@ -219,7 +219,7 @@ fn states(small: &Small, aside_from: usize) -> usize {
 
 /// How many states a hub with so many modes has.
 fn alone(n: usize) -> usize {
-    4 * n * n * n + 30 * n * n + 38 * n + 23
+    4 * n * n * n + 30 * n * n + 40 * n + 24
 }
 
 /// Where each of n modes may be left over, the states are as many as a coordinator can be in with one of them left, not with any

@@ -22,13 +22,14 @@ fn what_is_wrong_with_the_parameters_of_one_instance_only_is_told() {
         (
             "arm.lua",
             "on = state {},",
-            "on = state {}, again = state { entry = gain < 0.6 and 'make.undo' or 'e_built' },",
+            "on = state {}, again = state { entry = gain < 0.6 and 'make.undo' or { 'run.undo', 'make.undo' } },",
         ),
         (
             "arm.lua",
             "  trans { src = 'on', tgt = 'leaving'",
             "  trans { src = 'on', tgt = 'again', events = { 'e_again' } },
-  trans { src = 'again', tgt = 'on', events = { gain < 0.6 and 'make.undo.failed' or 'e_done' } },
+  trans { src = 'again', tgt = gain < 0.6 and 'on' or 'undone',
+    events = gain < 0.6 and { 'make.undo.failed' } or { 'make.undone', 'make.undo.failed', 'make.undo.broken' } },
   trans { src = 'again', tgt = 'leaving', events = { 'e_shutdown' } },
   trans { src = 'on', tgt = 'leaving'",
         ),

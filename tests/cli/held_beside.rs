@@ -135,3 +135,46 @@ fn one_that_fails_when_it_is_asked_for_anew_takes_the_first_ones_place() {
         says(&demo, &script, &["released 1"]);
     }
 }
+
+/// What an earlier one was to write and did not is not written for the later one either: its frame says so, and is one; and the undo of that
+/// one repairs what nobody knows of the earlier one.
+#[test]
+fn one_that_is_asked_for_anew_is_no_wholer_than_the_first() {
+    for (fault, said) in [
+        ("'port_write belt.speed = 0.0', 'late', 1", ["held: build run hold(partial)", "end: "]),
+        ("'operation_call belt.brake', 'lost', 1", ["held: build run", "end: "]),
+    ] {
+        for second in ["e_stop", "e_other"] {
+            let demo = conveyor(&HOLD.replace(
+                "property_set: { property: belt.k, value: 0.5 }",
+                "port_write: { port: belt.speed, value: 0.0 }",
+            ));
+            let other = "  hold2:\n    group: a\n    safe: true\n    changes: [{ port_write: { port: belt.speed, value: 0.0 } }, { operation_call: { operation: belt.brake } }]\n";
+            demo.replace("configurations.yaml", "  hold:\n", &format!("{other}  hold:\n"));
+            demo.replace("coordinator.yaml", "    held: {", "    other: { config: hold2 }\n    held: {");
+            demo.replace(
+                "coordinator.yaml",
+                "    - { src: held, tgt: failed,",
+                "    - { src: held, tgt: other, events: [e_other] }\n    - { src: other, tgt: held, events: [e_stop] }
+    - { src: other, tgt: failed, events: [e_reset, hold2.failed, hold2.broken] }
+    - { src: other, tgt: down, events: [e_end] }\n    - { src: held, tgt: failed,",
+            );
+            let script = format!(
+                "local function frames(what)
+                   local all = {{}}
+                   for _, f in ipairs(stack()) do all[#all + 1] = f.configuration .. (f.partial and '(partial)' or '') end
+                   say(what .. ': ' .. table.concat(all, ' '))
+                 end
+                 deploy('conveyor.yaml') wait(0.5) fault({fault})
+                 raise('e_stop') wait(0.05) raise('{second}') wait(12) frames('held')
+                 raise('e_end') wait(3) frames('end')
+                 shutdown()"
+            );
+            demo.write("s.lua", &script);
+            let ran = demo.run(&["run", "s.lua", "--clock", "simulated"]);
+            let said = said.map(|said| said.replace("hold(", if second == "e_stop" { "hold(" } else { "hold2(" }));
+            let missing: Vec<_> = said.iter().filter(|said| !ran.out.contains(&format!("{said}\n"))).collect();
+            assert!(ran.code == 0 && missing.is_empty(), "{fault} {second}: {missing:?}\n{}{}", ran.out, ran.err);
+        }
+    }
+}

@@ -27,6 +27,7 @@ mod hierarchy;
 mod hot_swap;
 mod ignored;
 mod kept;
+mod let_go;
 mod lies;
 mod listed;
 mod listing;

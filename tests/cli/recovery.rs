@@ -273,6 +273,27 @@ assert_state("log", "unconfigured")
     assert!(ran.code == 1 && ran.err.contains("`back`"), "{}{}", ran.out, ran.err);
 }
 
+/// *Down* with something there is not *down*: what was accepted as it is belongs to no frame, so its coordinator leaves it.
+#[test]
+fn what_was_accepted_is_told_when_its_coordinator_is_down() {
+    let deployed = Deployed::broken();
+    let run = |args: &[&str]| deployed.0.run(args);
+    assert_eq!(run(&["recover", "--accept"]).code, 0);
+    let event = run(&["event", "e_shutdown", "--wait", "make.undone"]);
+    assert_eq!(event.code, 0, "{}{}", event.out, event.err);
+    let status = run(&["status"]);
+    assert!(
+        status.code == 3 && status.out.contains("broken") && status.out.contains("davit shutdown"),
+        "{}",
+        status.out
+    );
+    let seen = deployed.status();
+    assert_eq!((&seen["phase"], &seen["left"]), (&json!("broken"), &json!(["log (unconfigured)"])), "{seen}");
+    assert_eq!(run(&["list", "--json"]).json()[0]["phase"], "broken");
+    let shutdown = run(&["shutdown"]);
+    assert_eq!(shutdown.code, 4, "{}{}", shutdown.out, shutdown.err);
+}
+
 #[test]
 fn a_script_tries_a_deployment_out_on_the_simulated_platform() {
     let demo = files();

@@ -366,3 +366,26 @@ fn a_scenario_is_the_same_every_time() {
         assert!(samples == first.2, "run {again}: {differs:?}");
     }
 }
+
+/// Also who goes over a table by its keys: Lua's own order is another one in each process.
+#[test]
+fn the_keys_of_a_table_come_in_an_order() {
+    let ran = hello(
+        "local t, s = { 7, 8, two = 2, one = 1, [10] = 3, [-1.5] = 4, [true] = 5 }, ''
+         for key, value in pairs(t) do s = s .. tostring(key) .. '=' .. value .. ' ' if key == 1 then t.one = nil end end
+         say(s)
+         local ok, why = pcall(function() for _ in pairs(nil) do end end)
+         say(why)
+         local own = setmetatable({}, { __pairs = function() return next, { a = 1 } end })
+         for key in pairs(own) do say('own ' .. key) end",
+        &["--quiet"],
+    );
+    assert!(ran.out.contains("-1.5=4 1=7 2=8 10=3 two=2 true=5 \n"), "{}{}", ran.out, ran.err);
+    assert!(
+        ran.out.contains(":5: bad argument #1 to 'for iterator' (table expected, got nil)"),
+        "{}{}",
+        ran.out,
+        ran.err
+    );
+    assert!(ran.out.contains("own a\n"), "{}{}", ran.out, ran.err);
+}

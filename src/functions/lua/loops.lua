@@ -1,5 +1,5 @@
 -- The functions of Lua's library that loop where nothing is counted: `charge(elements)` counts what one is going to touch
--- before it does, and raises an error when that is too much. They answer as Lua's own.
+-- before it does, and raises an error when that is too much. They answer as Lua's own, but that `pairs` keeps an order.
 --
 -- A table without a metatable is left to the library, since its length is what it holds. With one, all that is asked of it
 -- may be a function's answer (`__len` of 1e15), so the loop is done here, where every turn is counted.
@@ -293,10 +293,57 @@ if utf8 then
   end
 end
 
--- `tonumber`, for who puts it into its place.
+-- `pairs` in an order that does not change from run to run: Lua's own is by addresses and by a number that it draws when it starts, and
+-- who goes over a table by its keys must come to the same each time. Numbers first, then texts, each ascending, then what
+-- has no order. What is taken out on the way is not met any more, what is put in is not met.
+local next, sort, plain_pairs = next, table.sort, pairs
+
+local function in_order(t)
+  local numbers, texts, others, ascending = {}, {}, {}, true
+  for key in next, t do
+    local kind = type(key)
+    local list = kind == "number" and numbers or kind == "string" and texts or others
+    ascending = ascending and list == numbers and (#list == 0 or list[#list] < key)
+    list[#list + 1] = key
+  end
+  if ascending then return nil end
+  local count = #numbers + #texts + #others
+  if count > FEW then charge(count * log(count, 2)) end
+  sort(numbers)
+  sort(texts)
+  for _, list in ipairs { texts, others } do
+    for _, key in ipairs(list) do numbers[#numbers + 1] = key end
+  end
+  return numbers
+end
+
+local function ordered_pairs(...)
+  if select("#", ...) == 0 then error("bad argument #1 to 'pairs' (table expected, got no value)", 2) end
+  local t = ...
+  local meta = getmetatable(t)
+  -- What answers for itself, and the errors, are the library's. A metatable that does not show itself is asked as well.
+  if type(t) ~= "table" or type(meta) == "table" and rawget(meta, "__pairs") or meta ~= nil and type(meta) ~= "table" then
+    return plain_pairs(...)
+  end
+  local keys, at = in_order(t), 0
+  if not keys then return next, t, nil end
+  return function()
+    local key, value
+    repeat
+      at = at + 1
+      key = keys[at]
+      if key == nil then return nil end
+      value = rawget(t, key)
+    until value ~= nil
+    return key, value
+  end, t, nil
+end
+
+-- `tonumber` and `pairs`, for who puts them into their places.
 local to_number = tonumber
-return function(value, ...)
+local function counted_tonumber(value, ...)
   if type(value) == "string" and #value > FEW then charge(#value) end
   if select("#", ...) == 0 then return to_number(value) end
   return answered("tonumber", pcall(to_number, value, ...))
 end
+return counted_tonumber, ordered_pairs

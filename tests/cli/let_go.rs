@@ -1,0 +1,131 @@
+//! What a coordinator has let go of and what stayed all the same goes on the way down: whoever's undo it is in the way of, whichever way
+//! it was let go of, and whatever that undo came to.
+
+use crate::demo::Demo;
+
+/// The conveyor of the examples, whose safe configuration writes nothing that `slow` does, with a state where it is paused.
+fn conveyor() -> Demo {
+    let demo = Demo::new();
+    for file in ["conveyor.yaml", "configurations.yaml", "coordinator.yaml"] {
+        let text = std::fs::read_to_string(format!("{}/examples/conveyor/{file}", env!("CARGO_MANIFEST_DIR")));
+        demo.write(file, &text.unwrap());
+    }
+    demo.replace("configurations.yaml", "slow:\n    group: speed\n", "slow:\n");
+    demo.replace("configurations.yaml", "      - port_write: { port: belt.speed, value: 0.0 }\n", "");
+    demo.replace("coordinator.yaml", "config: slow }", "config: slow }\n        paused: {}");
+    let pauses = "        - { src: running, tgt: paused, events: [e_pause] }\n    failed: {}";
+    demo.replace("coordinator.yaml", "    failed: {}", pauses);
+    demo
+}
+
+/// `check` has nothing against it, and it is led down by its coordinators, with `slow` or whatever is named.
+fn goes_down(demo: &Demo, script: &str, told: &[&str]) {
+    let checked = demo.run(&["check", "conveyor.yaml"]);
+    assert!(checked.code == 0 && !checked.err.contains('⚠'), "{}", checked.err);
+    demo.write("s.lua", script);
+    let ran = demo.run(&["run", "s.lua", "--clock", "simulated"]);
+    let missing: Vec<_> = told.iter().filter(|told| !ran.out.contains(*told)).collect();
+    assert!(missing.is_empty(), "{missing:?}\n{}{}", ran.out, ran.err);
+    assert_eq!((ran.code, ran.out.contains("forced")), (0, false), "{}{}", ran.out, ran.err);
+}
+
+/// By naming its undo, and not by leaving a state that has it as its `config`.
+#[test]
+fn what_was_to_be_undone_by_its_name_goes_on_the_way_down() {
+    let demo = conveyor();
+    demo.replace("coordinator.yaml", "{ config: slow }", "{ entry: slow, exit: slow.undo }");
+    demo.replace(
+        "coordinator.yaml",
+        "slow.broken, belt.faulted",
+        "slow.broken, slow.undo.failed, slow.undo.broken, belt.faulted",
+    );
+    let script = "fault('port_write belt.speed', 'slow', 9, 0.2)
+        deploy('conveyor.yaml') wait(0.5)
+        raise('e_pause') wait(0.05) raise('e_stop') wait(2) shutdown()";
+    goes_down(&demo, script, &["slow.undo.failed", "`slow`, whose undo had failed before, was undone with it"]);
+}
+
+/// The undo ended *broken*, was mended when the component came back, and nobody asks for it any more.
+#[test]
+fn what_was_broken_and_came_back_goes_on_the_way_down() {
+    let demo = conveyor();
+    demo.replace(
+        "configurations.yaml",
+        "port_write: { port: belt.speed, value: 0.1 }",
+        "operation_call: { operation: belt.ease }",
+    );
+    demo.replace(
+        "conveyor.yaml",
+        "    operations:\n",
+        "    operations:\n      ease:    { effect: { undo: tighten } }\n      tighten: { effect: { undo: ease } }\n",
+    );
+    demo.replace("coordinator.yaml", "running: { config: slow }", "ready: {}\n        running: { config: slow }");
+    demo.replace(
+        "coordinator.yaml",
+        "tgt: running, events: [run.ok] }",
+        "tgt: ready, events: [run.ok] }\n        - { src: ready, tgt: running, events: [e_go] }",
+    );
+    demo.replace("conveyor.yaml", "up: running", "up: ready");
+    let script = "fault('operation_call belt.ease', 'late', 1)
+        deploy('conveyor.yaml') raise('e_go') wait(8) shutdown()";
+    goes_down(
+        &demo,
+        script,
+        &["slow.broken", "slow.undo.broken", "recovered", "`slow`, whose undo had failed before, was undone with it"],
+    );
+}
+
+/// It is in the way of another coordinator's undo alone, when its own has come to its end.
+#[test]
+fn what_is_in_the_way_of_another_coordinator_goes_on_the_way_down() {
+    let demo = conveyor();
+    demo.replace("conveyor.yaml", "coordinator: coordinator.yaml", "coordinators: { k: coordinator.yaml, j: j.yaml }");
+    demo.replace("conveyor.yaml", "up: running", "up: [k:running, j:running]");
+    demo.replace("conveyor.yaml", "    actuator: true\n    moves: [start]\n", "");
+    demo.replace(
+        "configurations.yaml",
+        "configurations:\n",
+        "configurations:\n  build_j:\n    changes: [{ create: { component: aux, type: Motor } }]\n",
+    );
+    demo.replace("configurations.yaml", "belt.speed, value: 0.1", "aux.speed, value: 0.1");
+    demo.replace(
+        "coordinator.yaml",
+        "{ src: initial, tgt: building }",
+        "{ src: initial, tgt: waiting }\n        - { src: waiting, tgt: building, events: [e_up] }",
+    );
+    demo.replace("coordinator.yaml", "        building: {", "        waiting: {}\n        building: {");
+    demo.replace(
+        "coordinator.yaml",
+        "tgt: off, events: [build.undone] }",
+        "tgt: off, events: [build.undone], effect: e_down }",
+    );
+    demo.write(
+        "j.yaml",
+        "coordinator:
+  states:
+    off: {}
+    building: { entry: build_j }
+    running: { entry: e_up }
+    failed: {}
+    leaving: {}
+    down: { entry: build_j.undo }
+    left: {}
+  transitions:
+    - { src: initial, tgt: off }
+    - { src: off, tgt: building, events: [e_start] }
+    - { src: building, tgt: running, events: [build_j.ok] }
+    - { src: building, tgt: failed, events: [build_j.failed, build_j.broken] }
+    - { src: building, tgt: down, events: [e_end] }
+    - { src: running, tgt: leaving, events: [e_end] }
+    - { src: leaving, tgt: down, events: [e_down, \"e_after(1)\"] }
+    - { src: failed, tgt: down, events: [e_end] }
+    - { src: left, tgt: down, events: [e_end] }
+    - { src: down, tgt: off, events: [build_j.undone] }
+    - { src: down, tgt: left, events: [build_j.undo.failed, build_j.undo.broken] }
+",
+    );
+    let script = "fault('port_write aux.speed', 'slow', 9, 0.2)
+        deploy('conveyor.yaml') wait(0.5)
+        raise('e_pause') wait(0.05) raise('e_stop') wait(2) shutdown()";
+    goes_down(&demo, script, &["slow.undo.failed", "`slow`, whose undo had failed before, was undone with it"]);
+}
