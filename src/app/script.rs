@@ -22,11 +22,13 @@ mod waits;
 
 use super::{Extensions, Refused};
 use crate::check::Far;
+use crate::diagnostics::{Language, SourceMap};
 use crate::functions::message_within;
-use crate::lang::{self, LoadOptions, Sources};
+use crate::lang::{self, LoadOptions, Sources, UnknownName};
 use crate::limits;
+use crate::model::codes::LUA_UNDEFINED;
 use crate::model::finding::did_you_mean;
-use crate::model::{Ask, ConfigId, Ident};
+use crate::model::{Ask, ConfigId, Finding, Ident};
 use crate::session::tap::LogSink;
 use crate::session::{Ended, NO_FORWARD, NotNamed, Session, Unanswered, recovery};
 use crate::time::{Clock, Time};
@@ -214,8 +216,41 @@ fn execute(path: &Path, text: &[u8], host: &SharedHost) -> Result<(), ScriptFail
     install(&lua, host).map_err(failed)?;
     guards.budget.count.interrupted_by(interrupt(host).asked());
     let chunk = lua.load(sandbox::without_hash_bang(text)).set_name(format!("@{}", path.display()));
-    let chunk = chunk.set_mode(mlua::chunk::ChunkMode::Text);
-    guards.budget.spend(limits::SCRIPT_INSTRUCTIONS, || chunk.exec()).map_err(failed)
+    let script = chunk.set_mode(mlua::chunk::ChunkMode::Text).into_function().map_err(failed)?;
+    no_unknown_names(path, text, &lua)?;
+    guards.budget.spend(limits::SCRIPT_INSTRUCTIONS, || script.call::<()>(())).map_err(failed)
+}
+
+/// A misspelt name is told before anything is brought up, and not in the middle of it.
+fn no_unknown_names(path: &Path, text: &[u8], lua: &Lua) -> Result<(), ScriptFailure> {
+    let Ok(text) = std::str::from_utf8(text) else { return Ok(()) };
+    let globals = lua.globals();
+    let known = |name: &str| globals.raw_get::<LuaValue>(name).is_ok_and(|value| !value.is_nil());
+    let unknown = lang::unknown_names(text, known);
+    if unknown.is_empty() {
+        return Ok(());
+    }
+    let mut sources = SourceMap::new();
+    let file = sources.add_file(path.display().to_string(), text, Language::Lua);
+    let finding = |one: UnknownName| {
+        let at = sources.exact(file, one.line, one.column, one.length);
+        Finding::error(LUA_UNDEFINED, format!("`{}` is not defined", one.name))
+            .at(at)
+            .help(meant(&one.name))
+            .labelled("here")
+    };
+    let findings = unknown.into_iter().map(finding).collect();
+    Err(ScriptFailure::Unknown { findings, sources: Box::new(sources) })
+}
+
+/// What may be meant by a name that there is not.
+fn meant(name: &str) -> String {
+    // What Lua has for it elsewhere is near nothing here.
+    match name {
+        "print" => "did you mean `say`?".to_owned(),
+        "sleep" => "did you mean `wait`?".to_owned(),
+        _ => did_you_mean(name, "functions", arguments::functions()),
+    }
 }
 
 fn install(lua: &Lua, host: &SharedHost) -> mlua::Result<()> {
@@ -312,13 +347,7 @@ fn install(lua: &Lua, host: &SharedHost) -> mlua::Result<()> {
     meta.set(
         "__index",
         lua.create_function(|_, (_, name): (Table, String)| -> mlua::Result<LuaValue> {
-            // What Lua has for it elsewhere is near nothing here.
-            let meant = match name.as_str() {
-                "print" => "did you mean `say`?".to_owned(),
-                "sleep" => "did you mean `wait`?".to_owned(),
-                _ => did_you_mean(&name, "functions", arguments::functions()),
-            };
-            Err(error(format!("`{name}` is not defined: {meant}")))
+            Err(error(format!("`{name}` is not defined: {}", meant(&name))))
         })?,
     )?;
     globals.set_metatable(Some(meta))

@@ -28,6 +28,7 @@ mod list;
 mod log;
 mod member;
 mod monitor;
+mod new;
 pub mod output;
 mod plan;
 mod plan_groups;
@@ -101,6 +102,7 @@ commands! {
     Check = check::Args,
     Plan = plan::Args,
     Graph = graph::Args,
+    New = new::Args,
     Types = types::Args,
     Convert = convert::Args,
     Sim = sim::Args,

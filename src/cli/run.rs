@@ -231,6 +231,9 @@ fn tell(script: &Path, failure: ScriptFailure) -> CommandFailure {
         ScriptFailure::Unreadable(finding) => {
             CommandFailure { exit: Exit::Usage, ..CommandFailure::found(vec![*finding], SourceMap::new()) }
         }
+        ScriptFailure::Unknown { findings, sources } => {
+            CommandFailure { exit: Exit::Usage, ..CommandFailure::found(findings, *sources) }
+        }
         ScriptFailure::Lua { message, syntax: true } => {
             let is_yaml = script.extension().is_some_and(|ending| ending == "yaml" || ending == "yml");
             let help = match is_yaml {

@@ -26,6 +26,7 @@ mod texts;
 mod tokens;
 mod tree;
 mod trusted;
+mod unknown_names;
 mod whole;
 mod words;
 mod yaml;
@@ -39,3 +40,4 @@ pub use load::{
 };
 pub use slips::key_again;
 pub use texts::LoadOptions;
+pub use unknown_names::{UnknownName, unknown_names};

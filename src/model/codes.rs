@@ -785,6 +785,9 @@ codes! {
          permission is denied. Nothing was written. Name another file, or leave `-o` out to print to the terminal. Or what \
          a command prints could not be written where its output goes, as to a full disk: part of it is missing. A \
          deployment lives on all the same; its command says so when it ends. A reader that goes away (`| head`) is no error.";
+    CLI_NOT_EMPTY = "cli::not_empty", "the folder is not empty",
+        "`davit new FOLDER` begins a deployment in a folder of its own. There is something in this one, which may be yours: nothing was written. \
+         Name a folder that is not there yet, or an empty one.";
     CLI_UNKNOWN_MONITOR = "cli::unknown_monitor", "there is no such monitor",
         "The file has monitors, but none of the name that was given. Correct the name, or leave the option out to run all \
          of them.";

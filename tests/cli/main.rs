@@ -35,6 +35,7 @@ mod lost;
 mod monitor;
 mod motion;
 
+mod new;
 mod part;
 mod recovery;
 mod resting;

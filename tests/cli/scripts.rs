@@ -389,3 +389,24 @@ fn the_keys_of_a_table_come_in_an_order() {
     );
     assert!(ran.out.contains("own a\n"), "{}{}", ran.out, ran.err);
 }
+
+/// A misspelt name is told with its line before anything is brought up, wherever in the script it stands.
+#[test]
+fn names_that_there_are_not_are_told_before_it_begins() {
+    let story = "deploy('@hello.yaml')
+local function later() rasie('e_stop') end
+print('up')
+say(raised and 1 or 2)
+raise(e_go)";
+    let ran = script(&Demo::new(), story, &[]);
+    assert_eq!((ran.code, ran.out.contains("build.ok")), (2, false), "{}{}", ran.out, ran.err);
+    for (name, place, help) in [
+        ("rasie", ":2:24", "did you mean `raise`?"),
+        ("print", ":3:1", "did you mean `say`?"),
+        ("raised", ":4:5", "did you mean `raise`?"),
+        ("e_go", ":5:7", "known functions"),
+    ] {
+        assert!(ran.err.contains(&format!("`{name}` is not defined")), "{name}: {}", ran.err);
+        assert!(ran.err.contains(&format!("script.lua{place}]")) && ran.err.contains(help), "{name}: {}", ran.err);
+    }
+}

@@ -1,6 +1,7 @@
 //! Why a script failed.
 
 use super::super::Refused;
+use crate::diagnostics::SourceMap;
 use crate::model::Finding;
 use std::path::PathBuf;
 
@@ -10,6 +11,14 @@ pub enum ScriptFailure {
     /// The file cannot be read, is no text, or is too large.
     #[error("{}", .0.message)]
     Unreadable(Box<Finding>),
+    /// It uses names that there are not. It was not begun.
+    #[error("it uses names that are not defined")]
+    Unknown {
+        /// Each with its place.
+        findings: Vec<Finding>,
+        /// The script.
+        sources: Box<SourceMap>,
+    },
     /// It does not parse, or it raised an error; the text names file and line.
     #[error("{message}")]
     Lua {
