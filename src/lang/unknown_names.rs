@@ -57,7 +57,8 @@ fn is_read(all: &[Token<'_>], at: usize) -> bool {
     let touches = |last: &Token<'_>| (last.line, last.column + last.length) == (all[at].line, all[at].column);
     let last = at.checked_sub(1).map(|at| &all[at]);
     let number = last.is_some_and(|last| touches(last) && last.text.starts_with(|c: char| c.is_ascii_digit()));
-    !member && !number && before(1) != "goto" && all.get(at + 1).is_none_or(|next| next.text != "=")
+    let attribute = before(1) == "<" && matches!(all[at].text, "const" | "close");
+    !member && !number && !attribute && before(1) != "goto" && all.get(at + 1).is_none_or(|next| next.text != "=")
 }
 
 /// All names that the text declares somewhere.
