@@ -155,6 +155,21 @@ fn a_slip_in_what_a_component_raises_is_told_by_its_type() {
     assert!(told(&["e_arrived"]).is_empty());
     let named = "`a.e_arrived` never comes: what `a` raises is heard without its name; did you mean `e_arrived`?";
     assert_eq!(told(&["a.e_arrived"]), [named]);
+    for (heard, wanted) in [
+        ("a.fault", "nobody raises `a.fault`: of `a` itself only `a.faulted` is told; did you mean `a.faulted`?"),
+        ("a.falted", "`a.falted` never comes: that `a` fails is told as `a.faulted`; did you mean `a.faulted`?"),
+        (
+            "a.ready",
+            "nobody raises `a.ready`: of `a` itself only `a.faulted` is told; wait for `a.faulted`, or for what it raises, which is \
+             heard without its name",
+        ),
+    ] {
+        assert_eq!(told(&[heard]), [wanted]);
+    }
+    assert!(told(&["a.faulted"]).is_empty());
+    // An operator raises it, who says so.
+    let hears = "trans { src = \"up\", tgt = \"leaving\", events = { \"a.ready\" } },";
+    assert!(check(hears, "safety: [a.ready]\n").of("coord::near_event").is_empty());
     assert!(told(&["e_one"]).is_empty(), "another word");
     for done in ["e_dne", "E_Done"] {
         let said = told(&[done]);
