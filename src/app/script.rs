@@ -25,7 +25,7 @@ use crate::check::Far;
 use crate::functions::message_within;
 use crate::lang::{self, LoadOptions, Sources};
 use crate::limits;
-use crate::model::finding::did_you_mean;
+use crate::model::finding::{and_also, did_you_mean};
 use crate::model::{Ask, ConfigId, Ident};
 use crate::session::tap::LogSink;
 use crate::session::{Ended, NO_FORWARD, NotNamed, Session, Unanswered, recovery};
@@ -316,7 +316,10 @@ fn install(lua: &Lua, host: &SharedHost) -> mlua::Result<()> {
             let meant = match name.as_str() {
                 "print" => "did you mean `say`?".to_owned(),
                 "sleep" => "did you mean `wait`?".to_owned(),
-                _ => did_you_mean(&name, "functions", arguments::functions()),
+                _ => and_also(
+                    &did_you_mean(&name, "functions", arguments::functions()),
+                    &format!("what is a name of something stands in quotes: `\"{name}\"`"),
+                ),
             };
             Err(error(format!("`{name}` is not defined: {meant}")))
         })?,
