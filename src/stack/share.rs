@@ -161,7 +161,7 @@ pub(super) struct Hindrance {
 
 /// The same, and which frame it is that stands in its way.
 pub(super) fn look(frames: &[Arc<Frame>], at: usize) -> Result<HandOver, Box<Hindrance>> {
-    handed(frames, at).map_err(|obstacle| Box::new(obstacle.told(frames, &frames[at])))
+    handed(frames, at).map_err(|obstacle| Box::new(obstacle.told(&frames[at])))
 }
 
 /// What stands in a frame's way.
@@ -173,8 +173,8 @@ enum Obstacle<'f> {
 }
 
 impl Obstacle<'_> {
-    /// In the way of this frame, which is one of these.
-    fn told(self, frames: &[Arc<Frame>], frame: &Frame) -> Hindrance {
+    /// In the way of this frame.
+    fn told(self, frame: &Frame) -> Hindrance {
         match self {
             Self::Floor(reason) => {
                 let message = format!("`{}` cannot be undone: {reason}", frame.configuration);
@@ -194,15 +194,9 @@ impl Obstacle<'_> {
                     format!(" (a frame of {})", other.requester)
                 };
                 let message = format!("`{mine}` cannot be undone before `{theirs}`{whose}, which {did} {}", touch.slot);
-                let in_force = frames.iter().filter(|frame| frame.configuration == theirs).count();
                 let help = match mine == theirs && frame.group.is_none() {
                     true => format!(
                         "`{mine}` was asked for more than once: give it a `group` of its own, so that it takes the place of the one in force"
-                    ),
-                    // Who has undone it once believes that it is gone.
-                    false if in_force > 1 => format!(
-                        "{in_force} frames of `{theirs}` are in force: undo each of them first, or give `{theirs}` a `group` of its own, \
-                         so that it takes the place of the one in force"
                     ),
                     false => format!("undo `{theirs}` first, or undo down to `{mine}`"),
                 };
