@@ -1,6 +1,6 @@
 //! Component types declared in a deployment.
 
-use super::{by_name, choice, condition, entries, name, names, own_name, text, value};
+use super::{by_name, condition, entries, name, names, own_name, text, value};
 use crate::lang::grammar::{EFFECT, OPERATION, PORT, PROPERTY, TYPE};
 use crate::lang::tree::{Cx, Entry, Fields, Kind, Node};
 use crate::model::finding::nearest;
