@@ -27,7 +27,7 @@ use crate::functions::message_within;
 use crate::lang::{self, LoadOptions, Sources, UnknownName};
 use crate::limits;
 use crate::model::codes::LUA_UNDEFINED;
-use crate::model::finding::did_you_mean;
+use crate::model::finding::{and_also, did_you_mean};
 use crate::model::{Ask, ConfigId, Finding, Ident};
 use crate::session::tap::LogSink;
 use crate::session::{Ended, NO_FORWARD, NotNamed, Session, Unanswered, recovery};
@@ -249,7 +249,10 @@ fn meant(name: &str) -> String {
     match name {
         "print" => "did you mean `say`?".to_owned(),
         "sleep" => "did you mean `wait`?".to_owned(),
-        _ => did_you_mean(name, "functions", arguments::functions()),
+        _ => and_also(
+            &did_you_mean(name, "functions", arguments::functions()),
+            &format!("what is a name of something stands in quotes: `\"{name}\"`"),
+        ),
     }
 }
 

@@ -6,6 +6,7 @@ use crate::model::codes::{
     COORD_ANSWER_NEVER_COMES, COORD_NEVER_EMITTED, COORD_UNKNOWN_ANSWER, COORD_UNKNOWN_REQUEST, DEPLOY_EVENT_UNHEARD,
     DEPLOY_UNKNOWN_STATE,
 };
+use crate::model::event::UNDO;
 use crate::model::finding::{and_also, did_you_mean, nearest};
 use crate::model::statechart::is_internal;
 use crate::model::{Ask, ConfigId, Deployment, EventName, Finding, Findings, Raise, Verdict};
@@ -110,8 +111,11 @@ pub fn answers(deployment: &Deployment, chart: &Chart) -> BTreeSet<EventName> {
 
 /// The names under which these configurations may be meant by a name.
 fn asked_for(ids: &[&str], name: &str) -> Vec<String> {
-    // `run.udno` is nearer to what undoes `run` than to `run`.
-    let undos = ids.iter().filter(|_| name.contains('.')).map(|id| format!("{id}.undo"));
+    // `run.udno` and `run_undo` are nearer to what undoes `run` than to `run`.
+    let undos = ids
+        .iter()
+        .filter(|_| name.contains('.') || name.contains(UNDO.trim_start_matches('.')))
+        .map(|id| format!("{id}.undo"));
     ids.iter().map(|id| (*id).to_owned()).chain(undos).collect()
 }
 

@@ -3,12 +3,19 @@
 use crate::limits;
 
 /// How far following a file has come.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Far {
     /// States that were met.
     pub states: usize,
     /// Transitions that were followed.
     pub transitions: usize,
+}
+
+impl Far {
+    /// This and another one, as one.
+    pub fn and(self, other: Self) -> Self {
+        Self { states: self.states + other.states, transitions: self.transitions + other.transitions }
+    }
 }
 
 /// Why following ends before its end.

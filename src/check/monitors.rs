@@ -21,7 +21,7 @@ pub fn check(deployment: &Deployment, universe: &Universe) -> Findings {
         check.path = format!("monitors.{}", monitor.name);
         check.condition(&monitor.when);
     }
-    check.findings.extend(never_run(deployment));
+    check.findings.extend(never_run(deployment).or_else(|| not_seen(deployment)));
     check.findings
 }
 
@@ -45,6 +45,24 @@ fn never_run(deployment: &Deployment) -> Option<Finding> {
             format!("create a component of the type `{MONITORS_TYPE}` in the bring-up, in an activity of its own"),
         ),
     )
+}
+
+/// A monitor that needs no values, which the simulated platform does not have, and is not evaluated there all the same.
+fn not_seen(deployment: &Deployment) -> Option<Finding> {
+    let reads_states = |condition: &Condition| {
+        let mut reads = false;
+        condition.for_each(&mut |condition| {
+            reads |= matches!(condition.kind, ConditionKind::InState { .. } | ConditionKind::Faulted(_));
+        });
+        reads
+    };
+    let first = deployment.monitors.iter().find(|monitor| reads_states(&monitor.when))?;
+    (!deployment.kind.shows_values).then(|| {
+        let message = format!("the simulated platform evaluates no monitors, and `{}` raises nothing there", first.name);
+        Finding::info(MONITOR_NOT_RUN, message).at(first.origin).path(format!("monitors.{}", first.name)).help(
+            "try it on the platform whose components run; what fails is told by `COMPONENT.faulted` on the simulated one, too",
+        )
+    })
 }
 
 /// What is wrong with the events.

@@ -9,11 +9,11 @@ use super::state::{Failed, Move, Next, ProductState};
 use crate::limits;
 use crate::model::codes::COORD_SAFETY_UNHEARD;
 use crate::model::finding::{count, did_you_mean};
-use crate::model::{Ask, Deployment, EventName, Finding, Findings, Origin, Severity};
+use crate::model::{Ask, ConfigId, Deployment, EventName, Finding, Findings, Origin, Severity};
 use crate::statechart::{Chart, EventId, NodeId};
 use rustc_hash::{FxHashMap, FxHashSet};
 use smallvec::SmallVec;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Events that no coordinator listens to.
 pub(super) fn unhandled(deployment: &Deployment, charts: &[&Chart]) -> Findings {
@@ -46,13 +46,13 @@ impl Graph<'_, '_> {
         let order = self.in_order();
         // Where nothing comes from outside, it does not matter what came first.
         let mut good = GoodStates::default();
-        let mut alike: FxHashMap<usize, (Vec<u32>, Vec<String>)> = FxHashMap::default();
+        let mut alike: FxHashMap<usize, BTreeMap<Option<ConfigId>, Deaf>> = FxHashMap::default();
         for (event, origin) in events {
             let mut known: FxHashSet<(SmallVec<[NodeId; 2]>, u32)> = FxHashSet::default();
             let class =
                 self.product.outside.iter().position(|outside| *outside == event).map(|at| self.product.alike[at]);
             let said = class.and_then(|class| alike.get(&class).cloned());
-            let (mut bad, mut places) = said.clone().unwrap_or_default();
+            let mut deaf = said.clone().unwrap_or_default();
             for at in order.iter().filter(|_| said.is_none()) {
                 let state = &self.reached.states[*at as usize];
                 let (world, settled) = (state.world, state.inbox.is_empty() && state.in_transit.is_empty());
@@ -66,19 +66,43 @@ impl Graph<'_, '_> {
                 if leads_elsewhere((self.product, &self.reached.states), state, event, &mut good).is_none() {
                     continue;
                 }
-                bad.push(*at);
+                let asked = asked_instead(self.product, state, event);
+                let deaf = deaf.entry(asked.as_ref().map(|(id, _)| *id)).or_default();
+                deaf.states.push(*at);
+                deaf.leads_to = deaf.leads_to.take().or(asked.map(|(_, place)| place));
                 let place = format!("`{}`", self.product.place(state));
-                if !places.contains(&place) {
-                    places.push(place);
+                if !deaf.places.contains(&place) {
+                    deaf.places.push(place);
                 }
             }
-            class.into_iter().for_each(|class| _ = alike.insert(class, (bad.clone(), places.clone())));
-            let Some(at) = self.best_first(bad).first().copied() else { continue };
+            class.into_iter().for_each(|class| _ = alike.insert(class, deaf.clone()));
+            for (asked, deaf) in deaf {
+                self.unheard((event, origin), asked, deaf, &mut good, found);
+            }
+        }
+    }
+
+    /// That an event does not lead to a safe configuration where it is deaf; `asked`: it leads to this one, which is not safe.
+    fn unheard(
+        &mut self,
+        (event, origin): (EventName, Origin),
+        asked: Option<ConfigId>,
+        Deaf { states, mut places, leads_to }: Deaf,
+        good: &mut GoodStates,
+        found: &mut Traced,
+    ) {
+        let Some(at) = self.best_first(states).first().copied() else { return };
+        let unknown = self.product.worlds.top(self.states[at as usize].world).is_some();
+        let severity = if unknown { Severity::Warning } else { Severity::Error };
+        let finding = if let (Some(id), Some(place)) = (asked, leads_to) {
+            let message = format!("`{event}` leads to `{place}` and asks for `{id}`, which is not `safe`");
+            let help = format!("write `safe = true` in `{id}`, or ask for a configuration there that is `safe`");
+            let written = self.product.worlds.configuration(id).map_or(Origin::NONE, |c| c.origin);
+            Finding::new(severity, COORD_SAFETY_UNHEARD, message).also(written, "this one is asked for").help(help)
+        } else {
             let more = places.len().saturating_sub(6);
             places.truncate(6);
             let more = if more > 0 { format!(" and {}", count(more, "more place")) } else { String::new() };
-            let unknown = self.product.worlds.top(self.states[at as usize].world).is_some();
-            let severity = if unknown { Severity::Warning } else { Severity::Error };
             let message = format!(
                 "`{event}` does not lead to a `safe` configuration in {}{more}, where an actuator {}",
                 places.join(", "),
@@ -86,17 +110,52 @@ impl Graph<'_, '_> {
             );
             let charts: Vec<&Chart> = self.product.members.iter().map(|member| member.chart).collect();
             let near = near(self.product.deployment, &charts, event).map(|near| near + " if not, ").unwrap_or_default();
-            let finding = Finding::new(severity, COORD_SAFETY_UNHEARD, message).at(origin).path("safety").help(format!(
+            Finding::new(severity, COORD_SAFETY_UNHEARD, message).help(format!(
                 "{near}add a transition on `{event}` to a state that asks for a `safe` configuration on its entry; one from the \
                  outermost state in which actuators exist serves for all inside"
-            ));
-            let state = self.states[at as usize].clone();
-            let on =
-                leads_elsewhere((self.product, &self.reached.states), &state, event, &mut good).unwrap_or_default();
-            let trace = self.trace_on(at, on);
-            found.push((finding, trace));
+            ))
+        };
+        let state = self.states[at as usize].clone();
+        let on = leads_elsewhere((self.product, &self.reached.states), &state, event, good).unwrap_or_default();
+        let trace = self.trace_on(at, on);
+        let finding = (finding.at(origin).path("safety"), trace);
+        // First where one is asked for: since it is not safe it is refused as well, where there is less than it touches.
+        match asked {
+            Some(_) => found.insert(0, finding),
+            None => found.push(finding),
         }
     }
+}
+
+/// Where a safety event does not lead to a safe configuration.
+#[derive(Debug, Clone, Default)]
+struct Deaf {
+    states: Vec<u32>,
+    places: Vec<String>,
+    /// Where it leads instead, if something is asked for there.
+    leads_to: Option<String>,
+}
+
+/// What is asked for, and is not safe, right where a safety event leads from a state, and where that is.
+fn asked_instead(product: &mut Product<'_>, state: &ProductState, event: EventName) -> Option<(ConfigId, String)> {
+    for number in 0..product.members.len() {
+        let id = product.members[number].chart.event(event);
+        if id == EventId::OTHER {
+            continue;
+        }
+        let reaction = product.members[number].react(state.leaves[number], id);
+        let mut asks = reaction.handed.iter().flat_map(|batch| &batch.requests).map(|request| request.ask);
+        let unsafe_one = asks.find_map(|ask| match ask {
+            Ask::Apply(id) => product.worlds.configuration(id).filter(|c| !c.safe).map(|_| id),
+            _ => None,
+        });
+        if let Some(id) = unsafe_one {
+            let mut after = state.clone();
+            after.leaves[number] = reaction.leaf;
+            return Some((id, product.place_of(&after, &[number])));
+        }
+    }
+    None
 }
 
 fn is_asked(product: &Product<'_>, state: &ProductState) -> bool {

@@ -84,10 +84,30 @@ impl<'a> KnownEvents<'a> {
             let message = format!("`{event}` never comes: what `{component}` raises is heard without its name");
             return Some(Finding::warning(COORD_NEAR_EVENT, message).help(format!("did you mean `{word}`?")));
         }
-        let component = event.strip_suffix(FAULTED)?;
-        (!created.contains(component)).then(|| {
+        let (component, word) = event.rsplit_once('.')?;
+        let is_fault = word == &FAULTED[1..];
+        let fault = nearest(word, [&FAULTED[1..]]).is_some() || is_fault;
+        let exists = created.contains(component);
+        let declared =
+            || EventName::new(event).is_ok_and(|event| self.declared.contains(&event) || self.told.contains(&event));
+        if exists && !is_fault && !self.deployment.looks_like_answer(event) && !declared() {
+            let message =
+                format!("nobody raises `{event}`: of `{component}` itself only `{component}{FAULTED}` is told");
+            let help = match fault {
+                true => format!("did you mean `{component}{FAULTED}`?"),
+                false => {
+                    format!("wait for `{component}{FAULTED}`, or for what it raises, which is heard without its name")
+                }
+            };
+            return Some(Finding::warning(COORD_NEAR_EVENT, message).help(help));
+        }
+        (fault && !exists && !self.deployment.looks_like_answer(event)).then(|| {
+            let help = match nearest(component, created.iter().copied()) {
+                Some(near) => format!("did you mean `{near}{FAULTED}`?"),
+                None => did_you_mean(component, "components", created.iter().copied()),
+            };
             Finding::warning(COORD_NEAR_EVENT, format!("`{event}` never comes: there is no component `{component}`"))
-                .help(did_you_mean(component, "components", created.iter().copied()))
+                .help(help)
         })
     }
 
@@ -95,6 +115,8 @@ impl<'a> KnownEvents<'a> {
     pub fn waited_for_as(&self, raised: &str) -> Option<&'a str> {
         let unheard =
             self.waited_for.iter().filter(|event| !self.told.contains(*event) && !self.is_known(event.as_str()));
+        // What answers a request is raised by nobody.
+        let unheard = unheard.filter(|event| !self.deployment.looks_like_answer(event.as_str()));
         let near = nearest(raised, unheard.map(|event| event.as_str()))?;
         is_slip(raised, near).then_some(near)
     }

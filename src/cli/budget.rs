@@ -129,10 +129,12 @@ impl CheckBudget {
         (!beside.is_empty()).then(|| beside.join(" and "))
     }
 
-    /// How far it is, for the line that tells it: states of all that are followed, and transitions of those followed now.
-    fn so_far(self, states: usize, transitions: usize) -> String {
+    /// How far it is, for the line that tells it: what all have come to that are followed, and of how many transitions each may.
+    fn so_far(self, Far { states, transitions }: Far, now: usize) -> String {
         let transitions = match self.bounds_transitions() {
-            true => format!("{transitions} of {}", count(self.transitions, "transition")),
+            true if now == transitions => format!("{transitions} of {}", count(self.transitions, "transition")),
+            // What was followed before had as many for itself.
+            true => format!("{} ({now} of {} here)", count(transitions, "transition"), self.transitions),
             false => count(transitions, "transition"),
         };
         let most = self.beside().map(|beside| format!(", at most {beside}"));
@@ -165,19 +167,19 @@ pub struct Following {
 /// What was told last, by those that follow side by side.
 struct ToldSoFar {
     at: Time,
-    /// The states of the files that a thread has followed, and of the one that it follows.
-    states: FxHashMap<ThreadId, (usize, usize)>,
+    /// How far the files are that a thread has followed, and the one that it follows.
+    far: FxHashMap<ThreadId, (Far, Far)>,
 }
 
 impl ToldSoFar {
-    /// How many states all have met, with what this thread tells of the file that it follows.
-    fn states(&mut self, of: usize) -> usize {
-        let (before, now) = self.states.entry(std::thread::current().id()).or_default();
-        if of < *now {
-            *before += *now;
+    /// How far all are, with what this thread tells of the file that it follows.
+    fn all(&mut self, of: Far) -> Far {
+        let (before, now) = self.far.entry(std::thread::current().id()).or_default();
+        if of.states < now.states || of.transitions < now.transitions {
+            *before = before.and(*now);
         }
         *now = of;
-        self.states.values().map(|(before, now)| before + now).sum()
+        self.far.values().fold(Far::default(), |all, (before, now)| all.and(*before).and(*now))
     }
 }
 
@@ -220,7 +222,7 @@ impl Following {
             bar,
             interrupted: Arc::default(),
             signals: Vec::new(),
-            told: Mutex::new(ToldSoFar { at: began, states: FxHashMap::default() }),
+            told: Mutex::new(ToldSoFar { at: began, far: FxHashMap::default() }),
         }
     }
 
@@ -248,14 +250,14 @@ impl Following {
             return;
         }
         let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
-        let states = told.states(far.states);
+        let all = told.all(far);
         let now = self.clock.now();
         let spent = now.since(self.began);
         if spent >= TELLS_AFTER && now.since(told.at) >= Duration::from_millis(100) {
             told.at = now;
             #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-            let rate = (states as f64 / spent.as_secs_f64()) as u64;
-            let so_far = self.budget.so_far(states, far.transitions);
+            let rate = (all.states as f64 / spent.as_secs_f64()) as u64;
+            let so_far = self.budget.so_far(all, far.transitions);
             self.bar.set_message(match self.signals.is_empty() {
                 true => format!("checking: {so_far}; {rate} states/s"),
                 false => format!("following: {so_far}; {rate} states/s; Ctrl-C tells what was found so far"),
@@ -283,10 +285,13 @@ mod tests {
 
     #[test]
     fn the_states_of_all_files_are_counted() {
-        let mut told = ToldSoFar { at: Clock::real().now(), states: FxHashMap::default() };
-        assert_eq!([4, 10, 3].map(|states| told.states(states)), [4, 10, 13], "another file begins anew");
-        let beside = std::thread::scope(|scope| scope.spawn(|| told.states(5)).join());
-        assert_eq!(beside.ok(), Some(18), "a thread tells of its own file");
+        let mut told = ToldSoFar { at: Clock::real().now(), far: FxHashMap::default() };
+        let far = |states: usize| Far { states, transitions: 2 * states };
+        assert_eq!([4, 10, 3].map(|states| told.all(far(states))), [4, 10, 13].map(far), "another file begins anew");
+        let beside = std::thread::scope(|scope| scope.spawn(|| told.all(far(5))).join());
+        assert_eq!(beside.ok(), Some(far(18)), "a thread tells of its own file");
+        let second = CheckBudget::default().so_far(told.all(far(6)), 12);
+        assert!(second.starts_with("21 states, 42 transitions (12 of "), "the count does not go back: {second}");
     }
 
     #[test]
@@ -302,7 +307,10 @@ mod tests {
             ),
         ] {
             let budget = text.parse::<CheckBudget>().unwrap();
-            assert_eq!((budget.told().as_str(), budget.so_far(8, 9).as_str()), (told, so_far));
+            assert_eq!(
+                (budget.told().as_str(), budget.so_far(Far { states: 8, transitions: 9 }, 9).as_str()),
+                (told, so_far)
+            );
         }
     }
 

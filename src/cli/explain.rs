@@ -6,7 +6,7 @@ use super::output::{Output, Style, Table, text_columns, wrapped};
 use super::{CommandContext, CommandFailure, CommandResult, Run};
 use crate::lang::schema::{self, ReferenceEntry};
 use crate::model::codes::{self, CLI_UNKNOWN_CODE, PAGES, Page};
-use crate::model::finding::{and_also, did_you_mean};
+use crate::model::finding::{and_also, did_you_mean, nearest};
 use serde::Serialize;
 
 /// Explain a finding (what happened, why it is refused, what to do), or a key of the files (what it means, its form, its unit, its
@@ -158,8 +158,9 @@ fn unknown(what: &str) -> CommandFailure {
             "`davit explain` lists all codes, `davit explain --keys` all keys",
         ),
     };
-    let known = PAGES.iter().map(|page| page.code.0).chain(schema::names());
-    CommandFailure::no(CLI_UNKNOWN_CODE, message, and_also(&did_you_mean(name, "codes and keys", known), list))
+    let near = nearest(name, PAGES.iter().map(|page| page.code.0).chain(schema::names()));
+    let help = near.map_or_else(|| list.to_owned(), |near| and_also(&format!("did you mean `{near}`?"), list));
+    CommandFailure::no(CLI_UNKNOWN_CODE, message, help)
 }
 
 /// What a key, a table or a word is, for people.

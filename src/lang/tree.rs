@@ -305,8 +305,16 @@ impl Fields {
                 continue;
             }
             let origin = cx.part(entry.origin, &entry.key);
-            let inside = matches!(entry.value.kind, Kind::Map(_)) && object.what == "a state";
+            let table =
+                matches!(&entry.value.kind, Kind::Map(_)) || matches!(&entry.value.kind, Kind::List(l) if l.is_empty());
+            let inside = table && object.what == "a state";
+            // `{ value: 1,0 }` and `{ events: a, b }`: a `,` ends the value before it.
+            let cut_off = matches!(entry.value.kind, Kind::Null) && !cx.is_lua(entry.origin);
             let help = match nearest(&entry.key, object.names()) {
+                None if cut_off && entry.key.bytes().all(|b| b.is_ascii_digit()) => {
+                    "is it of the number before it? Write that with a point, like `0.5`".to_owned()
+                }
+                None if cut_off => format!("is it one of several? They stand in brackets: `[…, {}]`", entry.key),
                 // In Lua a state is made by its function.
                 None if inside && cx.is_lua(entry.origin) => {
                     format!("a state inside is made by `state`: `{} = state {{ … }}`", entry.key)

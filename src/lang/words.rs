@@ -40,7 +40,7 @@ pub const CONDITIONS: &[Word] = &[
     word("equals", "equals(\"A.x\", 2.0)", "Both sides are equal.", 2, 3),
     word("differs", "differs(\"A.x\", 2.0)", "The sides are not equal, and both have a number.", 2, 3),
     word("is_true", "is_true(\"A.ready\")", "The bool is true, or the number is not 0.", 1, 1),
-    word("in_state", "in_state(\"A\", \"running\")", "The component is in that run state.", 2, 2),
+    word("in_state", "in_state(\"A\", \"running\")", "The component is in that run state, or is `faulted`.", 2, 2),
     word("faulted", "faulted(\"A\")", "The component is faulted.", 1, 1),
     word("silent", "silent(\"A.x\", 0.1)", "No sample has come for longer than that time (seconds).", 2, 2),
     many("all", "all { above(\"A.x\", 2.0), is_true(\"A.ready\") }", "All of these are true."),

@@ -127,7 +127,8 @@ impl YamlReader<'_> {
         let help = if line.trim_start_matches(' ').starts_with('\t') {
             "YAML is indented with blanks, never with tabs"
         } else {
-            "see what stands just before this place: a bracket or quote left open, a missing blank after `:`, or indentation that does not fit"
+            "see what stands just before this place: a name without its `:` at the end of a line, a bracket or quote left open, a missing blank after `:`, or \
+             indentation that does not fit"
         };
         Box::new(Finding::error(code, format!("this is not YAML: {}", error.info())).at(origin).help(help))
     }

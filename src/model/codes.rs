@@ -922,7 +922,8 @@ codes! {
         "A deployment's monitors are a component of it, of the type `davit.Monitors`: they watch while it runs, in the \
          rounds of its activity. No configuration creates one, so nothing is watched. Create it where the other \
          components are created, as in `create(\"Monitors\", \"davit.Monitors\", { activity = \"safety\" })`, in an \
-         activity whose period is short enough for what is to be noticed.";
+         activity whose period is short enough for what is to be noticed. On the simulated platform no component does \
+         anything, so there no monitor is evaluated either.";
     MONITOR_UNHEARD = "monitor::unheard", "nobody listens to an event of a monitor",
         "No transition of the coordinator waits for the event and no configuration is confirmed by it, so the monitor \
          watches in vain. The name may be misspelt in one of the two places.";

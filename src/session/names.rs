@@ -156,7 +156,10 @@ impl Session {
             return None;
         }
         let about = |name: &&str| Verdict::split(name).map(|(subject, _)| subject) == subject;
-        let all = || answers.iter().map(EventName::as_str);
+        // `grasp.done` does not mean `grasp.undone`, which is the contrary.
+        let contrary =
+            |name: &&str| event.rsplit_once('.').is_some_and(|(_, word)| name.ends_with(&format!("un{word}")));
+        let all = || answers.iter().map(EventName::as_str).filter(|name| !contrary(name));
         let near: Vec<&str> = match all().any(|name| about(&name)) {
             true => all().filter(about).collect(),
             false => all().collect(),

@@ -112,6 +112,9 @@ impl Violation {
                 format!("add `{} = …` ({ty}) to the properties of this create", property.member)
             }
             Self::NotWritable { .. } => "connect a component that sends what you want to write".to_owned(),
+            Self::ArgumentCount { operation, wanted, .. } if wanted.is_empty() => {
+                format!("it takes no arguments: `operation_call(\"{operation}\")`")
+            }
             Self::ArgumentCount { operation, wanted, .. } | Self::Argument { operation, wanted, .. } => {
                 let wanted: Vec<String> = wanted.iter().map(ValueType::to_string).collect();
                 format!("call it as {operation}({})", wanted.join(", "))

@@ -352,9 +352,9 @@ fn unfitted(ty: &ValueType, value: &Value) -> String {
     format!("expected {ty}, found {} (not converted)", value.describe())
 }
 
-/// `float in N`.
+/// `float, in N`, and that the number stands alone.
 fn wanted(ty: &ValueType, unit: Option<&str>) -> String {
-    unit.map_or_else(|| ty.to_string(), |unit| format!("{ty} in {unit}"))
+    unit.map_or_else(|| ty.to_string(), |unit| format!("{ty}, in {unit} (written without the unit)"))
 }
 
 fn set_allowed(property: MemberRef, value: &Value, view: &impl View, found: &mut Vec<Violation>) {

@@ -84,6 +84,36 @@ fn an_operator_is_not_blamed_for_the_frames_of_a_coordinator() {
     assert!(own.iter().filter(full).all(|f| f["severity"] == "warning"), "{:#}", said.0);
 }
 
+/// Of two frames of one configuration the coordinator undoes one, and takes it for all.
+#[test]
+fn that_another_frame_of_it_is_there_is_told_to_who_has_undone_one() {
+    let help = |group: &str| {
+        let configurations =
+            CONFIGURATIONS.replace("soft = Configuration { ", &format!("soft = Configuration {{ {group} "));
+        let states = format!(
+            "{STATES} trying = state {{ entry = \"soft\" }}, held = state {{}}, going = state {{ entry = \"soft.undo\" }},
+             trans {{ src = \"up\", tgt = \"trying\", events = {{ \"e_soft\" }} }},
+             trans {{ src = \"trying\", tgt = \"held\", events = {{ \"soft.ok\" }} }},
+             trans {{ src = \"trying\", tgt = \"stuck\", events = {{ \"soft.failed\", \"soft.broken\" }} }},
+             trans {{ src = \"held\", tgt = \"trying\", events = {{ \"e_soft\" }} }},
+             trans {{ src = \"held\", tgt = \"going\", events = {{ \"e_shutdown\" }} }},
+             trans {{ src = \"going\", tgt = \"leaving\", events = {{ \"soft.undone\" }} }},
+             trans {{ src = \"going\", tgt = \"stuck\", events = {{ \"soft.undo.failed\", \"soft.undo.broken\" }} }},"
+        );
+        let said = Small::new(&configurations, &states, "").check();
+        let refused = texts(&said, "coord::request_refused");
+        refused
+            .iter()
+            .filter(|(_, help)| help.contains("two frames"))
+            .map(|(_, help)| (*help).to_owned())
+            .collect::<Vec<_>>()
+    };
+    let once_more = "two frames of `soft` were in force, and `soft.undone` tells of one: let it lead to `soft.undo` once more, or give \
+                     `soft` a `group` of its own, so that it takes the place of the one in force";
+    assert_eq!(help(""), [once_more]);
+    assert!(help("group = \"soft\",").is_empty());
+}
+
 #[test]
 fn a_near_event_is_a_slip_where_it_is_near_enough_and_nobody_declares_it() {
     let listens = |events: &[&str], keys: &str| {
@@ -155,6 +185,21 @@ fn a_slip_in_what_a_component_raises_is_told_by_its_type() {
     assert!(told(&["e_arrived"]).is_empty());
     let named = "`a.e_arrived` never comes: what `a` raises is heard without its name; did you mean `e_arrived`?";
     assert_eq!(told(&["a.e_arrived"]), [named]);
+    for (heard, wanted) in [
+        ("a.fault", "nobody raises `a.fault`: of `a` itself only `a.faulted` is told; did you mean `a.faulted`?"),
+        ("a.falted", "`a.falted` never comes: that `a` fails is told as `a.faulted`; did you mean `a.faulted`?"),
+        (
+            "a.ready",
+            "nobody raises `a.ready`: of `a` itself only `a.faulted` is told; wait for `a.faulted`, or for what it raises, which is \
+             heard without its name",
+        ),
+    ] {
+        assert_eq!(told(&[heard]), [wanted]);
+    }
+    assert!(told(&["a.faulted"]).is_empty());
+    // An operator raises it, who says so.
+    let hears = "trans { src = \"up\", tgt = \"leaving\", events = { \"a.ready\" } },";
+    assert!(check(hears, "safety: [a.ready]\n").of("coord::near_event").is_empty());
     assert!(told(&["e_one"]).is_empty(), "another word");
     for done in ["e_dne", "E_Done"] {
         let said = told(&[done]);

@@ -49,6 +49,34 @@ fn a_safety_event_leads_to_a_safe_configuration_wherever_an_actuator_exists() {
     assert!(found.len() == 1 && found[0]["message"].as_str().unwrap().contains("root.up"), "{:#}", late.0);
 }
 
+/// Where what a safety event asks for is not safe, that is said, before all that comes of it.
+#[test]
+fn a_safe_configuration_that_is_not_called_so_is_told_first() {
+    let configurations = "base = Configuration { create(\"arm\", \"Arm\"), create(\"a\", \"Drive\") },
+        stop = Configuration { SAFE property_set(\"a.gain\", 0.0) },";
+    let stopped = "stopped = state { entry = \"stop\" }, trans { src = \"stopped\", tgt = \"leaving\", events = { \"e_shutdown\" }, effect = \"stop.undo\" },";
+    let hears: String = ["building", "up", "leaving", "failed"]
+        .iter()
+        .map(|state| format!("trans {{ src = \"{state}\", tgt = \"stopped\", events = {{ \"e_estop\" }} }},"))
+        .collect();
+    let said = |safe: &str| {
+        let configurations = configurations.replace("SAFE", safe);
+        Small::new(&configurations, &format!("{STATES}{stopped}{hears}"), "safety: [e_estop]\n").check()
+    };
+    assert!(said("safe = true,").of("coord::safety_unheard").is_empty());
+    let forgotten = said("");
+    let first = &forgotten.0["findings"][0];
+    let told = "`e_estop` leads to `root.stopped` and asks for `stop`, which is not `safe`";
+    assert_eq!(
+        (first["message"].as_str(), first["severity"].as_str()),
+        (Some(told), Some("error")),
+        "{:#}",
+        forgotten.0
+    );
+    assert!(first["help"].as_str().unwrap().starts_with("write `safe: true` in `stop`"), "{first:#}");
+    assert!(first["trace"].as_array().unwrap().len() > 2, "{first:#}");
+}
+
 #[test]
 fn what_is_lost_is_heard_wherever_it_may_be_in_force() {
     let configurations = "base = Configuration { create(\"a\", \"Drive\"), post_conf_state = { \"a:running\" }, holds = in_state(\"a\", \"running\") },";

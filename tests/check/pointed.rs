@@ -100,6 +100,16 @@ fn in_yaml_it_is_the_word_itself() {
         ("lift_coord.yaml", "[make, e", "[mkae, e", "coord::unknown_request", "mkae,", "`make`"),
         ("lift_coord.yaml", "e_built]", "e_biult]", "coord::unknown_request", "e_biult]", "`e_built`"),
         ("lift_coord.yaml", "entry: run.undo", "entry: run.udno", "coord::unknown_request", "run.udno", "`run.undo`"),
+        ("lift_coord.yaml", "entry: run.undo", "entry: run.undoo", "coord::unknown_request", "run.undoo", "`run.undo`"),
+        ("lift_coord.yaml", "entry: run.undo", "entry: run_undo", "coord::unknown_request", "run_undo", "`run.undo`"),
+        (
+            "lift_conf.yaml",
+            "operation: Motor.raise",
+            "operation: Motor.raise, args: [1]",
+            "conf::bad_arguments",
+            "Motor.raise",
+            "`operation_call: { operation: Motor.raise }`",
+        ),
         ("lift_coord.yaml", "[make.ok]", "[mkae.ok]", "coord::unknown_answer", "mkae.ok]", "`make.ok`"),
     ];
     let mut wrong = Vec::new();

@@ -130,7 +130,11 @@ const SHARED: &[Shared] = &[
         of_pid: "property_set('ctrl.k', 2.0)",
         off: "",
         of_mpc: "property_set('ctrl.k', 25)",
-        wrong: ["conf::bad_value", "`ctrl.k` cannot be 2.0: 2 is less than 20", "give it a value of type float in N"],
+        wrong: [
+            "conf::bad_value",
+            "`ctrl.k` cannot be 2.0: 2 is less than 20",
+            "give it a value of type float, in N (written without the unit)",
+        ],
     },
     Shared {
         what: "length of an array",

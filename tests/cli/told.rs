@@ -105,6 +105,8 @@ fn scripted(text: &str) -> Ran {
 fn a_function_that_is_called_otherwise_says_how_it_is_called() {
     for (text, told) in [
         ("wait_state('soft')", "`wait_state` is called as `wait_state(\"STATE\", SECONDS)`: something is missing"),
+        ("say(nil)", "`say` is called as `say(\"TEXT\")`: what is given is nil"),
+        ("say(e_go)", "what is a name of something stands in quotes: `\"e_go\"`"),
         ("log(1)", "a table is wanted where this"),
         ("say('a', 'b')", "`say` is called as `say(\"TEXT\")`: 2 values are given"),
         ("now(1)", "it takes nothing"),
@@ -297,6 +299,14 @@ shutdown: { event: e_stop, down: idle, within_s: 5 }
 ";
     let ran = crate::small::run(deployment, configurations, script);
     assert_eq!(ran.code, 0, "{}{}", ran.out, ran.err);
+}
+
+#[test]
+fn what_nobody_can_explain_is_no_list_of_what_can_be() {
+    let told = |what: &str| at_home(&["explain", what]).err.split_whitespace().collect::<Vec<_>>().join(" ");
+    let none = told("nosuchkey");
+    assert!(none.ends_with("help: `davit explain` lists all codes, `davit explain --keys` all keys"), "{none}");
+    assert!(told("timeuot").contains("did you mean `timeout`?"));
 }
 
 #[test]

@@ -180,6 +180,7 @@ fn a_script_that_fails_leaves_nothing_behind() {
         ("deploy('@generic_arm.yaml') asert_running('x')", "did you mean `assert_running`?"),
         ("deploy('@generic_arm.yaml') wait_answer('e_never', 1)", "`e_never` was not heard in 1 s"),
         ("deploy('@generic_arm.yaml') wait_answer('eight_DOF.okk', 1)", "is never heard"),
+        ("deploy('@generic_arm.yaml') wait_answer('eight_DOF.done', 1)", "`eight_DOF.ok`"),
         ("deploy('@generic_arm.yaml') wait_answer('eight_DOF.okk', 1)", "did you mean `eight_DOF.ok`?"),
         ("deploy('@generic_arm.yaml') wait_answer('eigth_DOF.ok', 1)", "did you mean `eight_DOF.ok`?"),
         ("deploy('@generic_arm.yaml') wait_answer('undo.dome', 1)", "did you mean `undo.done`?"),

@@ -269,6 +269,30 @@ fn what_scxml_forbids_is_told() {
             format!("<state id=\"a\">{}</state><final id=\"b\">{}</final>", to("event=\"e\""), to("event=\"f\"")),
             "`final` has no transitions",
         ),
+        (
+            format!("<state id=\"a\">{}</state><final id=\"b\"><state id=\"c\"/></final>", to("event=\"e\"")),
+            "`state` stands in a `final`",
+        ),
+        ("<state id=\"a\" initial=\"b\"><state id=\"c\"/></state><state id=\"b\"/>".to_owned(), "2:24 `b` does not stand inside of `a`"),
+        ("<state id=\"a\" initial=\"b\"/><state id=\"b\"/>".to_owned(), "2:24 `b` does not stand inside of `a`"),
+        (
+            format!("<state id=\"a\"><initial>{}</initial><state id=\"c\"/></state><state id=\"b\"/>", to("")),
+            "`b` does not stand inside of `a`",
+        ),
+        ("<state id=\"a\"><transition event=\"e\" taget=\"a\"/></state>".to_owned(), "2:37 `transition` has no attribute `taget`"),
+        ("<state ide=\"a\"/>".to_owned(), "2:8 `state` has no attribute `ide`"),
+        (
+            "<state id=\"a\"><onentry><send event=\"e\" delay=\"2s\" target=\"#_internal\"/></onentry>\
+             <transition event=\"e\" target=\"b\"/></state><state id=\"b\"/>"
+                .to_owned(),
+            "`e` is sent later to `#_internal`",
+        ),
+        (
+            "<state id=\"a\"><onentry><send event=\"e\" delay=\"2s\" id=\"tt\"/></onentry><onexit><cancel sendid=\"ttt\"/></onexit>\
+             <transition event=\"e\" target=\"b\"/></state><state id=\"b\"/>"
+                .to_owned(),
+            "`ttt` takes nothing back: `e` is sent with the id `tt`",
+        ),
         (format!("<state id=\"a\">{}</state><state id=\"b\"/>", to("event=\"\"")), "`event` is empty"),
         (
             format!("<state id=\"a\"><initial>{}</initial><state id=\"b\"/></state>", to("event=\"e\"")),
@@ -290,6 +314,8 @@ fn what_scxml_forbids_is_told() {
         let found = findings(&document(&body));
         assert!(matches!(&found[..], [one] if one.contains(words)), "{body}: {found:?}");
     }
+    let found = findings("<scxml version=\"1.0\"><state id=\"a\"/></scxml>");
+    assert!(matches!(&found[..], [one] if one.contains("`scxml` does not name SCXML's namespace")), "{found:?}");
     let found = findings(&document("<state id=\"a\"/>").replace("1.0", "2.0"));
     assert!(matches!(&found[..], [one] if one.contains("`version`")), "{found:?}");
 }

@@ -56,8 +56,13 @@ pub(super) fn taken<T: FromLuaMulti>(name: &str, given: MultiValue, lua: &Lua) -
         };
         return Err(wrong(more));
     }
+    let nil = given.iter().position(mlua::Value::is_nil);
     T::from_lua_multi(given, lua).map_err(|why| match why {
-        Error::FromLuaConversionError { from: "nil", .. } => wrong("something is missing".to_owned()),
+        Error::FromLuaConversionError { from: "nil", .. } => wrong(match nil {
+            Some(at) if count == 1 && at == 0 => "what is given is nil".to_owned(),
+            Some(at) => format!("of what is given, number {} is nil", at + 1),
+            None => "something is missing".to_owned(),
+        }),
         Error::FromLuaConversionError { from, to, .. } => {
             let wanted = match to.as_str() {
                 "table" | "Table" => "a table",

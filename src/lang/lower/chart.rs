@@ -175,7 +175,7 @@ fn transition(cx: &mut Cx, node: Node) -> Option<ChartTransition> {
         match &node.kind {
             Kind::Str(text) => match Trigger::parse(text) {
                 Ok(trigger) => out.events.push((trigger, place)),
-                Err(error) => super::bad_name(cx, &node, &error, example),
+                Err(error) => super::bad_name(cx, &node, &error, timed(text).as_deref().unwrap_or(example)),
             },
             Kind::Function => function(cx, &node, "a predicate in `events`"),
             _ => cx.wrong(&node, "an event", "a name (a text)", example),
@@ -189,6 +189,13 @@ fn transition(cx: &mut Cx, node: Node) -> Option<ChartTransition> {
     out.doc = fields.text(cx, "doc");
     fields.finish(cx);
     Some(out)
+}
+
+/// How a time event is written that is written otherwise: with a unit, or without its brackets.
+fn timed(text: &str) -> Option<String> {
+    let word = ["e_after", "e_at"].into_iter().find(|word| text.starts_with(word))?;
+    let rest = text[word.len()..].trim_matches(|c: char| c.is_whitespace() || "()=:".contains(c));
+    Some(format!("events = {{ \"{word}({})\" }}", super::parse_time(rest)?))
 }
 
 fn reference(cx: &mut Cx, fields: &mut Fields, key: &'static str) -> Option<(String, Origin)> {

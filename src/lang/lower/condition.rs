@@ -256,7 +256,14 @@ fn signal(cx: &mut Cx, node: Node, depth: usize) -> Option<MonitoredSignal> {
     }
     let origin = cx.place(&node);
     match node.kind {
-        Kind::Str(_) => return Some(MonitoredSignal { kind: K::Port(port_signal(cx, &node)?), origin }),
+        Kind::Str(ref text) => {
+            if let Some((message, example, why)) = no_port(text) {
+                let help = format!("write it like `{example}`{why}");
+                cx.report(Finding::error(codes::TEXT_WRONG_TYPE, message).at(origin).help(help));
+                return None;
+            }
+            return Some(MonitoredSignal { kind: K::Port(port_signal(cx, &node)?), origin });
+        }
         Kind::Int(_) | Kind::Float(_) => {
             let v = number(cx, &node, "a constant", "2.0")?;
             return Some(MonitoredSignal { kind: K::Constant(v), origin });
@@ -299,6 +306,25 @@ fn signal(cx: &mut Cx, node: Node, depth: usize) -> Option<MonitoredSignal> {
         }
     };
     Some(MonitoredSignal { kind, origin })
+}
+
+/// What a text is that cannot be a port: a number with its unit, or a word with what it is said of. With how that is written.
+fn no_port(text: &str) -> Option<(String, String, &'static str)> {
+    let text = text.trim();
+    let end = text.find(|c: char| !c.is_ascii_digit() && !matches!(c, '.' | '-' | '+')).unwrap_or(text.len());
+    if let Ok(number) = text[..end].parse::<f64>() {
+        let message = format!("`{text}` is a text, where a number is wanted");
+        return Some((message, format!("above(\"A.x\", {number})"), ": the number alone, in the unit of the port"));
+    }
+    let (word, of) = text.strip_suffix(')')?.split_once('(')?;
+    let word = SIGNALS.iter().find(|known| known.name == word.trim())?;
+    let quoted = |of: &str| match of.trim().trim_matches(['"', '\'']) {
+        number if number.parse::<f64>().is_ok() => number.to_owned(),
+        name => format!("\"{name}\""),
+    };
+    let of: Vec<String> = of.split(',').map(quoted).collect();
+    let message = "this is no name of a port, but a signal made of one".to_owned();
+    Some((message, format!("{}({})", word.name, of.join(", ")), ""))
 }
 
 fn port_signal(cx: &mut Cx, node: &Node) -> Option<PortSignal> {

@@ -29,7 +29,20 @@ pub fn configurations(cx: &mut Cx, node: Node) -> Vec<Configuration> {
         cx.either(node.origin, "ConfiguratorConf { engage = Configuration { … } }", "engage: { changes: [ … ] }");
     let entries = entries(cx, node, "the list of configurations", &example);
     let mut all = Vec::with_capacity(entries.len());
-    for entry in entries {
+    let mut entries = entries.into_iter().peekable();
+    while let Some(entry) = entries.next() {
+        // `gentle:` and `changes:` below each other: the key is meant to stand in it.
+        let is_key = |next: &Entry| CONFIGURATION.key(&next.key).is_some() && !matches!(next.value.kind, Kind::Map(_));
+        if matches!(entry.value.kind, Kind::Null) && entries.peek().is_some_and(is_key) {
+            while let Some(key) = entries.next_if(is_key) {
+                let message = format!("`{}` stands beside `{}`, and is a key of it", key.key, entry.key);
+                let finding = Finding::error(codes::TEXT_WRONG_TYPE, message).at(key.origin);
+                cx.report(
+                    finding.also(entry.origin, "with nothing in it").help("indent it more than the name above it"),
+                );
+            }
+            continue;
+        }
         let origin = if matches!(entry.value.kind, Kind::Made(..)) { entry.value.origin } else { entry.origin };
         let before = cx.findings.len();
         let id = own_name::<ConfigId>(cx, &entry, "a configuration's name", "enable_copying");

@@ -1,8 +1,9 @@
 //! Component types declared in a deployment.
 
-use super::{by_name, choice, condition, entries, name, names, own_name, text, value};
+use super::{by_name, condition, entries, name, names, own_name, text, value};
 use crate::lang::grammar::{EFFECT, OPERATION, PORT, PROPERTY, TYPE};
 use crate::lang::tree::{Cx, Entry, Fields, Kind, Node};
+use crate::model::finding::nearest;
 use crate::model::{
     ComponentType, Direction, Effect, EventName, Finding, Ident, OperationType, PortType, PropertyType, Resource,
     Tunable, TypeName, ValueType, codes,
@@ -169,8 +170,19 @@ fn effect(cx: &mut Cx, node: Node) -> Option<Effect> {
                 let node = Node::new(Kind::Str(operation.trim().into()), node.origin);
                 return name(cx, &node, "an operation", EFFECT.example).map(Effect::Undo);
             }
-            let choices = [("none", 0), ("irreversible", 1)];
-            choice(cx, &node, "`effect`", &choices).map(|n| if n == 0 { Effect::None } else { Effect::Irreversible })
+            let words = ["none", "irreversible"];
+            match &**text {
+                "none" => return Some(Effect::None),
+                "irreversible" => return Some(Effect::Irreversible),
+                _ => {}
+            }
+            let help = match nearest(text, words) {
+                Some(near) => format!("did you mean `{near}`?"),
+                None => "known values: `none`, `irreversible`, `{ undo: OPERATION }`".to_owned(),
+            };
+            let (origin, message) = (cx.place(&node), format!("`effect` cannot be `{text}`"));
+            cx.report(Finding::error(codes::TEXT_BAD_VALUE, message).at(origin).help(help));
+            None
         }
         _ => {
             if !matches!(node.kind, Kind::Map(_)) {

@@ -12,7 +12,7 @@ use mlua::{Function, LightUserData, Lua, MultiValue, Table, Value};
 /// Puts all words into the environment.
 pub fn install(lua: &Lua, env: &Table, shared: &SharedRecorder) -> mlua::Result<()> {
     for word in CONDITIONS.iter().chain(SIGNALS) {
-        env.raw_set(word.name, recording(lua, shared, word)?)?;
+        env.raw_set(word.name, recording(lua, shared, word, false)?)?;
     }
     env.raw_set("monitor", of_a_table(lua, shared, "monitor", None)?)?;
     let unnamed = (codes::MONITOR_UNNAMED, "write `name = monitor { … }`");
@@ -20,8 +20,8 @@ pub fn install(lua: &Lua, env: &Table, shared: &SharedRecorder) -> mlua::Result<
     Ok(())
 }
 
-/// A word as a function.
-fn recording(lua: &Lua, shared: &SharedRecorder, word: &'static Word) -> mlua::Result<Function> {
+/// A word as a function, or as a method of its first argument.
+fn recording(lua: &Lua, shared: &SharedRecorder, word: &'static Word, method: bool) -> mlua::Result<Function> {
     let recorder = shared.clone();
     lua.create_function(move |lua, args: MultiValue| {
         let line = sandbox::line(lua);
@@ -32,6 +32,15 @@ fn recording(lua: &Lua, shared: &SharedRecorder, word: &'static Word) -> mlua::R
             }
             recorder.call_at(line, word.name)
         };
+        if method && !matches!(args.front(), Some(Value::LightUserData(_))) {
+            let mut recorder = recorder.borrow_mut();
+            let message = format!("`{}` is called with `.`, so it does not get what stands before it", word.name);
+            let finding = Finding::error(codes::MONITOR_ARGUMENTS, message).at(origin);
+            // What it was to be part of is lost, and no news.
+            recorder.undefined.insert(word.name.to_owned());
+            recorder.cx.report(finding.help(format!("write `:` for it: `{}`", word.usage)));
+            return Ok(convert::poison());
+        }
         let mut nodes: Vec<Node> = args.iter().map(|v| convert::node(&recorder, v, origin)).collect();
         if word.many
             && nodes.len() == 1
@@ -48,7 +57,7 @@ fn recording(lua: &Lua, shared: &SharedRecorder, word: &'static Word) -> mlua::R
 pub fn methods(lua: &Lua, shared: &SharedRecorder) -> mlua::Result<Table> {
     let table = lua.create_table()?;
     for word in CONDITIONS.iter().filter(|word| word.method) {
-        table.raw_set(word.name, recording(lua, shared, word)?)?;
+        table.raw_set(word.name, recording(lua, shared, word, true)?)?;
     }
     Ok(table)
 }

@@ -1,6 +1,7 @@
 //! What constructors record while a Lua file runs.
 
 use crate::lang::params::Params;
+use crate::lang::tokens::tokens;
 use crate::lang::tree::{Cx, Kind, Node, Reading};
 use crate::limits;
 use crate::model::{Code, Finding, Origin, codes};
@@ -40,6 +41,12 @@ pub struct Exhausted {
     pub code: Code,
     pub message: String,
     pub line: u32,
+}
+
+/// A name whose value is asked for, see [`Recorder::read_here`].
+pub struct ReadName {
+    pub path: String,
+    pub called: bool,
 }
 
 /// The state of one run.
@@ -105,6 +112,26 @@ impl Recorder {
     /// The place of a name on a line where its value is asked for.
     pub fn read_at(&mut self, line: u32, name: &str) -> Origin {
         self.cx.sources.read(self.reading.file, line, name)
+    }
+
+    /// How a name stands on a line where its value is asked for: with the names behind it (`base.odom`), and whether it is called.
+    pub fn read_here(&self, line: u32, name: &str) -> ReadName {
+        let file = self.cx.sources.file(self.reading.file);
+        let tokens = tokens(&file.text[file.line(line)]);
+        let Some(mut at) = tokens.iter().position(|token| token.text == name) else {
+            return ReadName { path: name.to_owned(), called: false };
+        };
+        let mut path = name.to_owned();
+        let is_word = |text: &str| text.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_');
+        while let [dot, member, ..] = &tokens[at + 1..]
+            && dot.text == "."
+            && is_word(member.text)
+        {
+            path = format!("{path}.{}", member.text);
+            at += 2;
+        }
+        let called = tokens.get(at + 1).is_some_and(|next| ["(", "{", "\""].contains(&next.text));
+        ReadName { path, called }
     }
 
     /// Records what a constructor made; answers its number.

@@ -8,7 +8,7 @@
 
 use super::budget::{charge, known_metatables};
 use super::convert;
-use super::recorder::SharedRecorder;
+use super::recorder::{ReadName, SharedRecorder};
 use crate::functions;
 use crate::lang::tree::Kind;
 use crate::limits;
@@ -266,7 +266,12 @@ pub fn undefined(lua: &Lua, shared: &SharedRecorder, table: &Table, prefix: &str
                 .help("a configuration file is plain data with a little arithmetic: give what it needs as a parameter (`with:`)"),
             None => {
                 let near = nearest(&name, known.iter().map(String::as_str));
+                let read = recorder.read_here(line, &name);
                 let help = match near {
+                    // What is not used as it would be was hardly meant.
+                    Some(near) if prefix.is_empty() && !is_used_as(&table, near, &read) => {
+                        format!("what is a name of something stands in quotes: `\"{}\"`; if not, did you mean `{near}`?", read.path)
+                    }
                     Some(near) if prefix.is_empty() => {
                         format!("did you mean `{near}`? what is a name of something stands in quotes: `\"{name}\"`")
                     }
@@ -287,6 +292,15 @@ pub fn undefined(lua: &Lua, shared: &SharedRecorder, table: &Table, prefix: &str
     meta.raw_set("__metatable", false)?;
     table.set_metatable(Some(meta))?;
     Ok(())
+}
+
+/// Whether a name is used as what has that other one would be: a function is called, of a table something is asked for.
+fn is_used_as(table: &Table, other: &str, read: &ReadName) -> bool {
+    match table.raw_get::<Value>(other) {
+        Ok(Value::Function(_)) => read.called,
+        Ok(Value::Table(_)) => read.called || read.path.contains('.'),
+        _ => true,
+    }
 }
 
 /// What can be done with handles and with the undefined value: `:undo` of a handle, anything with the latter.

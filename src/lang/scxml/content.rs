@@ -75,7 +75,8 @@ impl<'t> ScxmlReader<'_, 't> {
                         element,
                         codes::SCXML_SENT_HOME,
                         message,
-                        "write `target=\"#_parent\"` if it is for the outside",
+                        "write `target=\"#_parent\"` if it is for the outside; if the chart is to go on by it, leave `event` out where \
+                         that is waited for",
                     );
                 }
                 Some("#_internal") => {

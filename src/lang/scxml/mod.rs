@@ -17,9 +17,10 @@ use crate::model::statechart::{ChartNode, ChartTransition, Connector, INITIAL, R
 use crate::model::{Code, ConfigId, Finding, Ident, Origin, codes};
 use meaning::EventNames;
 use places::{LineIndex, TooMuch, too_much};
-use roxmltree::{Document, Node as Element, ParsingOptions};
+use roxmltree::{Attribute, Document, Node as Element, ParsingOptions};
 use rustc_hash::{FxHashMap, FxHashSet};
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// Reads an SCXML document.
 pub fn read(cx: &mut Cx, reading: Reading) -> Option<Statechart> {
@@ -115,6 +116,24 @@ impl<'t> ScxmlReader<'_, 't> {
         self.places.place(self.cx, start, u32::try_from(length).unwrap_or(1))
     }
 
+    /// The name of an attribute.
+    fn at_name(&mut self, attribute: Attribute<'_, 't>) -> Origin {
+        self.at_range(attribute.range_qname())
+    }
+
+    /// What an attribute of an element says; the element, where it has none.
+    fn at_value(&mut self, element: Element<'_, 't>, key: &str) -> Origin {
+        match element.attribute_node(key) {
+            Some(attribute) => self.at_range(attribute.range_value()),
+            None => self.at(element),
+        }
+    }
+
+    fn at_range(&mut self, range: Range<usize>) -> Origin {
+        let length = self.places.text(range.clone()).chars().count().max(1);
+        self.places.place(self.cx, range.start, u32::try_from(length).unwrap_or(1))
+    }
+
     fn report(&mut self, element: Element<'_, 't>, code: Code, message: impl Into<String>, help: &str) {
         let origin = self.at(element);
         self.cx.report(Finding::error(code, message).at(origin).help(help));
@@ -131,7 +150,10 @@ impl<'t> ScxmlReader<'_, 't> {
 
     fn document(&mut self, root: Element<'_, 't>) -> Option<Statechart> {
         if !root.has_tag_name((SCXML, "scxml")) {
-            let message = format!("the outermost element is `{}`, not SCXML's `scxml`", root.tag_name().name());
+            let message = match root.tag_name().name() {
+                "scxml" => "`scxml` does not name SCXML's namespace".to_owned(),
+                name => format!("the outermost element is `{name}`, not SCXML's `scxml`"),
+            };
             self.report(
                 root,
                 codes::TEXT_NOTHING,
@@ -315,7 +337,7 @@ impl<'t> ScxmlReader<'_, 't> {
         let named =
             element.attribute("initial").filter(|_| fqn != ROOT || element.has_tag_name((SCXML, "scxml")) || self.ours);
         let target = match named {
-            Some(ids) => self.one_target(element, ids),
+            Some(ids) => self.one_target(element, "initial", ids),
             None if self.ours => return,
             None => inside.first().and_then(|first| self.full.get(&first.id()).cloned()),
         };

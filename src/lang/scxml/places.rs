@@ -3,6 +3,7 @@
 use crate::lang::tree::{Cx, Reading};
 use crate::limits;
 use crate::model::Origin;
+use std::ops::Range;
 
 /// What of a document costs the parser more than its length.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -86,6 +87,11 @@ impl<'t> LineIndex<'t> {
             (line, column) = if c == '\n' { (line + 1, 0) } else { (line, column + 1) };
         }
         Self { reading, text, marks }
+    }
+
+    /// What stands between two byte offsets.
+    pub fn text(&self, range: Range<usize>) -> &'t str {
+        self.text.get(range).unwrap_or_default()
     }
 
     pub fn place(&self, cx: &mut Cx, offset: usize, length: u32) -> Origin {

@@ -1,9 +1,9 @@
 //! What is no word of SCXML: attributes that it does not have, elements of other languages, text. Nothing is passed over without a word.
 
-use super::{ScxmlReader, own};
+use super::{ScxmlReader, is_state, own};
 use crate::lang::print::scxml::{OURS, SCXML};
-use crate::model::codes;
-use crate::model::finding::did_you_mean;
+use crate::model::finding::{did_you_mean, nearest};
+use crate::model::{Finding, codes};
 use roxmltree::Node as Element;
 use rustc_hash::FxHashSet;
 
@@ -76,7 +76,8 @@ impl<'t> ScxmlReader<'_, 't> {
             let own = element.attributes().filter(|attribute| attribute.namespace() == Some(OURS));
             for attribute in own.filter(|attribute| !OWN.contains(&attribute.name())) {
                 let (key, help) = (attribute.name(), did_you_mean(attribute.name(), "attributes", OWN.iter().copied()));
-                self.report(element, codes::TEXT_UNKNOWN_KEY, format!("there is no attribute `davit:{key}`"), &help);
+                let (origin, message) = (self.at_name(attribute), format!("there is no attribute `davit:{key}`"));
+                self.cx.report(Finding::error(codes::TEXT_UNKNOWN_KEY, message).at(origin).help(help));
             }
             if element.tag_name().namespace() == Some(OURS) {
                 let message = format!("there is no element `davit:{}`", element.tag_name().name());
@@ -98,6 +99,10 @@ impl<'t> ScxmlReader<'_, 't> {
         if name == "transition" && inside("final") {
             let help = "make it a `state`, or lead on from the state around it by `done.state.…`";
             self.report(element, codes::TEXT_BAD_VALUE, "`final` has no transitions: with it all ends there", help);
+        } else if (is_state(element) || name == "initial") && inside("final") {
+            let help = "make it a `state`: what is `final` has no states inside";
+            let message = format!("`{name}` stands in a `final`: with that all ends");
+            self.report(around.unwrap_or(element), codes::TEXT_BAD_VALUE, message, help);
         } else if name == "transition" && inside("initial") && element.attribute("event").is_some() {
             let help = "leave `event` out: it is taken when the state is entered";
             self.report(element, codes::TEXT_BAD_VALUE, "the transition in `initial` waits for nothing", help);
@@ -111,6 +116,7 @@ impl<'t> ScxmlReader<'_, 't> {
             let message = format!("`{name}` has `initial` twice, as an attribute and as an element");
             self.report(element, codes::TEXT_DUPLICATE_KEY, message, "leave one of them out");
         }
+        self.leads_out(element);
         if name == "scxml" && element.attribute("version").is_some_and(|version| version != "1.0") {
             self.report(
                 element,
@@ -118,6 +124,30 @@ impl<'t> ScxmlReader<'_, 't> {
                 "there is no other `version` than 1.0",
                 "write `version=\"1.0\"`",
             );
+        }
+    }
+
+    /// The way into a state that leads out of it.
+    fn leads_out(&mut self, element: Element<'_, 't>) {
+        // A final state has no way in at all, which is told by itself.
+        let full = self.full.get(&element.id()).filter(|_| !element.has_tag_name((SCXML, "final")));
+        let Some(full) = full.cloned() else { return };
+        let written = inside(element, "initial").into_iter().flat_map(|initial| inside(initial, "transition"));
+        let ways = std::iter::once((element, "initial")).chain(written.map(|transition| (transition, "target")));
+        for (at, key) in ways.collect::<Vec<_>>() {
+            for id in at.attribute(key).unwrap_or_default().split_whitespace() {
+                let is_inside = |target: &String| target.strip_prefix(&full).is_some_and(|rest| rest.starts_with('.'));
+                // One that there is not is told where it is looked for: in what has states inside.
+                let known = self.ids.get(id);
+                if known.is_some_and(is_inside) || known.is_none() && element.children().any(is_state) {
+                    continue;
+                }
+                let origin = self.at_value(at, key);
+                let name = element.attribute("id").unwrap_or("state");
+                let message = format!("`{id}` does not stand inside of `{name}`, which begins with it");
+                let help = "name a state inside of it, or leave `initial` out: then it begins with the first one";
+                self.cx.report(Finding::error(codes::TEXT_BAD_VALUE, message).at(origin).help(help));
+            }
         }
     }
 
@@ -131,7 +161,8 @@ impl<'t> ScxmlReader<'_, 't> {
                 self.no_counterpart(element, format!("`{key}` of `{name}` has no counterpart here"), help);
             } else if !known.contains(&key) {
                 let help = did_you_mean(key, "attributes", known.iter().copied());
-                self.report(element, codes::TEXT_UNKNOWN_KEY, format!("`{name}` has no attribute `{key}`"), &help);
+                let (origin, message) = (self.at_name(attribute), format!("`{name}` has no attribute `{key}`"));
+                self.cx.report(Finding::error(codes::TEXT_UNKNOWN_KEY, message).at(origin).help(help));
             }
         }
         let kind =
@@ -200,15 +231,15 @@ impl<'t> ScxmlReader<'_, 't> {
                 let message = format!("`{event}` is sent later twice by one state");
                 self.no_counterpart(send, message, "give the two events names of their own");
             }
-            if send.attribute("target").is_some_and(|target| target != "#_internal") {
+            if send.attribute("target") == Some("#_internal") {
+                let message = format!("`{event}` is sent later to `#_internal`, where all comes at once");
+                self.no_counterpart(send, message, "leave `target` out: then it comes back later");
+            } else if send.attribute("target").is_some() {
                 let message = format!("`{event}` is sent later to the outside");
                 let help = "send it on the entry of a state that a time event (`e_after`) leads to";
                 self.no_counterpart(send, message, help);
             } else if heard.contains(event) && !send.attribute("id").is_some_and(|id| taken_back.contains(id)) {
-                let message =
-                    format!("`{event}` comes in SCXML also when this state was left; here it ends with the state");
-                let help = "give it an `id`, and take it back on exit: `<onexit><cancel sendid=\"…\"/></onexit>`";
-                self.warn(send, codes::SCXML_OUTLIVES, message, help);
+                self.outlives(state, send, event);
             }
         }
         for send in blocks("onexit").flat_map(|block| inside(block, "send")) {
@@ -233,6 +264,36 @@ impl<'t> ScxmlReader<'_, 't> {
         }
     }
 
+    /// That what a state sends later is not taken back when that is left, or under another name.
+    fn outlives(&mut self, state: Element<'_, 't>, send: Element<'_, 't>, event: &str) {
+        let id = send.attribute("id");
+        let sent = |id: &str| {
+            let mut all = state.document().root().descendants();
+            all.any(|element| element.has_tag_name((SCXML, "send")) && element.attribute("id") == Some(id))
+        };
+        let slip = |cancel: &Element<'_, 't>| {
+            let back = cancel.attribute("sendid").filter(|_| cancel.has_tag_name((SCXML, "cancel")));
+            back.is_some_and(|back| nearest(back, id).is_some() && !sent(back))
+        };
+        let cancel = state.descendants().find(slip);
+        let (origin, message, help) = match (cancel, id) {
+            (Some(cancel), Some(id)) => {
+                let back = cancel.attribute("sendid").unwrap_or_default();
+                let message = format!("`{back}` takes nothing back: `{event}` is sent with the id `{id}`");
+                (self.at_value(cancel, "sendid"), message, format!("did you mean `{id}`?"))
+            }
+            _ => {
+                let message =
+                    format!("`{event}` comes in SCXML also when this state was left; here it ends with the state");
+                let gives = if id.is_some() { "" } else { "give it an `id`, and " };
+                let id = id.unwrap_or("…");
+                let help = format!("{gives}take it back on exit: `<onexit><cancel sendid=\"{id}\"/></onexit>`");
+                (self.at(send), message, help)
+            }
+        };
+        self.cx.report(Finding::warning(codes::SCXML_OUTLIVES, message).at(origin).help(help));
+    }
+
     /// Whether an event has a name that means something by itself here, and nothing in SCXML.
     pub(super) fn is_taken(&mut self, element: Element<'_, 't>, event: &str) -> bool {
         let taken = event == "e_done"
@@ -246,6 +307,13 @@ impl<'t> ScxmlReader<'_, 't> {
         }
         taken
     }
+}
+
+/// Whether an element has an attribute that SCXML does not have there.
+pub(super) fn has_unknown(element: Element<'_, '_>) -> bool {
+    let known = ATTRIBUTES.iter().find(|(of, _)| *of == element.tag_name().name()).map(|(_, known)| *known);
+    let own = element.attributes().filter(|attribute| attribute.namespace().is_none());
+    known.is_some_and(|known| own.into_iter().any(|attribute| !known.contains(&attribute.name())))
 }
 
 /// Events that a state waits for which does not send them itself later: these come from elsewhere.

@@ -1,12 +1,13 @@
 //! Transitions and what triggers them.
 
 use super::content::NO_COUNTERPART;
+use super::strange::has_unknown;
 use super::{ScxmlReader, is_state, own};
 use crate::lang::print::scxml::SCXML;
 use crate::limits;
 use crate::model::finding::did_you_mean;
 use crate::model::statechart::{ChartTransition, INITIAL, ROOT, Since, Trigger};
-use crate::model::{EventName, codes};
+use crate::model::{EventName, Finding, codes};
 use roxmltree::Node as Element;
 use rustc_hash::FxHashSet;
 use std::collections::BTreeMap;
@@ -19,7 +20,8 @@ impl<'t> ScxmlReader<'_, 't> {
         timers.filter_map(|c| Some((c.attribute("event")?.to_owned(), seconds(c.attribute("delay")?)?))).collect()
     }
 
-    pub(super) fn one_target(&mut self, element: Element<'_, 't>, ids: &str) -> Option<String> {
+    /// The state that an attribute names.
+    pub(super) fn one_target(&mut self, element: Element<'_, 't>, key: &str, ids: &str) -> Option<String> {
         let mut all = ids.split_whitespace();
         let (first, more) = (all.next()?, all.next());
         if more.is_some() {
@@ -29,13 +31,17 @@ impl<'t> ScxmlReader<'_, 't> {
         match self.ids.get(first) {
             Some(target) if target == ROOT => Some(format!("{ROOT}.{INITIAL}")),
             Some(target) => Some(target.clone()),
+            // Of an `id` that is misspelt it is told at that.
+            None if element.document().descendants().any(|other| is_state(other) && has_unknown(other)) => None,
             None => {
                 // Nobody reads what thousands may have meant.
                 let help = match self.cx.findings.len() < limits::FINDINGS_SHOWN {
                     true => did_you_mean(first, "states", self.ids.keys().map(String::as_str)),
                     false => "name a state that is there".to_owned(),
                 };
-                self.report(element, codes::TEXT_BAD_VALUE, format!("there is no state `{first}`"), &help);
+                let origin = self.at_value(element, key);
+                let message = format!("there is no state `{first}`");
+                self.cx.report(Finding::error(codes::TEXT_BAD_VALUE, message).at(origin).help(help));
                 None
             }
         }
@@ -51,11 +57,15 @@ impl<'t> ScxmlReader<'_, 't> {
     ) -> Option<ChartTransition> {
         let origin = self.at(element);
         let Some(ids) = element.attribute("target") else {
+            // One that is misspelt is told by itself.
+            if has_unknown(element) {
+                return None;
+            }
             let help = "a transition always leads somewhere: raise the names on the entry of a state";
             self.no_counterpart(element, "a transition without a target", help);
             return None;
         };
-        let target = self.one_target(element, ids)?;
+        let target = self.one_target(element, "target", ids)?;
         if own(element, "function").is_some() {
             let help = "read the coordinator from the Lua file that has it";
             self.no_counterpart(element, "a condition that was left out", help);
