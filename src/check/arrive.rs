@@ -66,6 +66,13 @@ impl Product<'_> {
             return;
         }
         self.forgets_offered(state, by, left);
+        // Mostly there is nothing to forget, and nothing is copied for that.
+        let idle = |request: &Request| gone(request) || !is_for_somebody(request);
+        let told = |(request, _): &(Request, Verdict)| idle(request);
+        let mut in_transit = state.in_transit.iter().flat_map(|batch| &batch.requests);
+        if !state.safe.iter().any(gone) && !state.due.iter().chain(&state.telling).any(told) && !in_transit.any(gone) {
+            return;
+        }
         state.change(|seldom| {
             seldom.safe.update(gone, |request| request.tag = (0, 0));
             seldom.due.update(|(request, _)| gone(request), |(request, _)| request.tag = (0, 0));

@@ -6,7 +6,7 @@
 
 use super::edges::{Barred, Edge};
 use super::explore::Graph;
-use super::state::Move;
+use super::state::{Move, ProductState};
 use crate::model::monitor::is_monitors;
 use crate::model::{EventName, Monitor, RunState, Value};
 use crate::system::View;
@@ -56,12 +56,12 @@ impl Graph<'_, '_> {
     /// Where its time stands still while it is stopped: a safe configuration has come since, and people decide how it goes on,
     /// by the event that ends the deployment once more.
     pub(super) fn stands_still(&self) -> Vec<bool> {
-        let safe = |at: u32| {
-            let state = &self.states[at as usize];
-            state.stopping && (state.elsewhere || self.product.worlds.is_safe(state.world))
-        };
+        let is_safe =
+            |state: &ProductState| state.stopping && (state.elsewhere || self.product.worlds.is_safe(state.world));
+        let safes: Vec<bool> = self.states.iter().map(is_safe).collect();
+        let safe = |at: u32| safes[at as usize];
         // What was in force before counts for nothing. Each state is judged by its best way.
-        let begins = |edge: &&Edge| !self.states[edge.from as usize].stopping && safe(edge.to);
+        let begins = |edge: &&Edge| safe(edge.to) && !self.states[edge.from as usize].stopping;
         let open: Vec<u32> = self.edges.iter().filter(begins).map(|edge| edge.to).collect();
         let best = |edge: &Edge| self.failed[edge.from as usize].max(edge.failed()) <= self.failed[edge.to as usize];
         // Where one is there that was asked for meanwhile, that holds it now; of a group it is the only one.

@@ -34,7 +34,8 @@ impl Graph<'_, '_> {
     /// What is too slow. `bars`: what leads down there.
     pub(super) fn slow(&mut self, bars: &[Option<Barred>]) -> Slow {
         let within = self.product.deployment.shutdown.within;
-        let stops = |at: u32| self.states[at as usize].stopping;
+        let stopping: Vec<bool> = self.states.iter().map(|state| state.stopping).collect();
+        let stops = |at: u32| stopping[at as usize];
         // What is refused is not raised; what may come leads there, and need not lead on.
         let comes = |(number, edge): &(usize, &Edge)| {
             stops(edge.from) && !matches!(bars[*number], Some(Barred::Closed | Barred::Late))
@@ -47,7 +48,6 @@ impl Graph<'_, '_> {
         if timers.is_empty() {
             return Slow::default();
         }
-        let stops = |at: u32| self.states[at as usize].stopping;
         let edges = || some.iter().map(|number| (*number, &self.edges[*number]));
         let whole = |timers: &Timers| timers.iter().map(|timer| self.product.lasts_whole(*timer)).max();
         let takes = |(number, edge): (usize, &Edge)| {
@@ -86,7 +86,6 @@ impl Graph<'_, '_> {
         // With the times that run at once.
         let (left, set_off) = (self.left_to_enter_anew(&some), self.set_off(&some));
         let timed = Timed { timers, set_off, left };
-        let stops = |at: u32| self.states[at as usize].stopping;
         let rests = |at: u32| stops(at) && self.states[at as usize].is_at_rest() && !ends[at as usize];
         let waits = |at: u32| stops(at) && !ends[at as usize] && (rests(at) || answered.contains(&at));
         let Some(places) = self.places(&first, &some, &timed, rests, &late) else {

@@ -36,7 +36,8 @@ impl Graph<'_, '_> {
 
     /// From everywhere there is a way down. What was not followed to its end may lead down.
     pub(super) fn ways_down(&mut self, stuck: &FxHashSet<u32>, found: &mut Traced) {
-        let reaches = self.reaching_down(|_, _| true);
+        let arrives = self.arrives();
+        let reaches = self.reaching_down(&arrives, |_, _| true);
         let several = self.product.members.len() > 1;
         let lost = |at: &u32| {
             let rests = !several || self.states[*at as usize].is_at_rest();
@@ -53,7 +54,7 @@ impl Graph<'_, '_> {
         };
         let Some(at) = self.best_first(some).first().copied() else {
             let comes_up = self.comes_up();
-            let told = self.once_down(&reaches, &comes_up, found);
+            let told = self.once_down(&arrives, &reaches, &comes_up, found);
             return self.failing(&comes_up, told, found);
         };
         let deployment = self.product.deployment;
@@ -83,9 +84,9 @@ impl Graph<'_, '_> {
     }
 
     /// From which states such edges lead to *down*, or to where it is not followed, or to nothing that is known.
-    fn reaching_down(&self, counts: impl Fn(usize, &Edge) -> bool) -> Vec<bool> {
+    fn reaching_down(&self, arrives: &[bool], counts: impl Fn(usize, &Edge) -> bool) -> Vec<bool> {
         let forced = |state: &ProductState| self.product.worlds.top(state.world).is_some();
-        let mut reaches = self.arrives();
+        let mut reaches = arrives.to_vec();
         // What the broken ends lead to is taken away by force: that is no way down of an intact system.
         let mut open: Vec<u32> = (0u32..).zip(&reaches).filter(|(_, reaches)| **reaches).map(|(at, _)| at).collect();
         open.retain(|at| !forced(&self.states[*at as usize]));
@@ -129,7 +130,7 @@ impl Graph<'_, '_> {
     /// The event that ends the deployment is raised once, and not all that leads on where it is not being stopped does then:
     /// one finding, of the worst; of several as bad, of what is the first of these in the way somewhere. The state that is
     /// warned of; none: none is.
-    fn once_down(&mut self, reaches: &[bool], comes_up: &[bool], found: &mut Traced) -> Option<u32> {
+    fn once_down(&mut self, arrives: &[bool], reaches: &[bool], comes_up: &[bool], found: &mut Traced) -> Option<u32> {
         let (bars, behind_failed) = (self.bars(), self.behind_failed(comes_up));
         // Where something fails not every coordinator can go on; but a bring-up that has failed is to be led down.
         let expects = |failed: &[Failed], at: u32| failed[at as usize] == Failed::Nothing || behind_failed[at as usize];
@@ -145,13 +146,13 @@ impl Graph<'_, '_> {
         };
         let mut before = reaches.to_vec();
         // Nothing comes of what is refused.
-        let stops = |at: u32| self.states[at as usize].stopping;
-        let begun = self.edges.iter().filter(|edge| !stops(edge.from) && stops(edge.to)).map(|edge| edge.to);
-        let begun: Vec<u32> = begun.collect();
+        let stopping: Vec<bool> = self.states.iter().map(|state| state.stopping).collect();
+        let stops = |at: u32| stopping[at as usize];
+        let begins: Vec<&Edge> = self.edges.iter().filter(|edge| !stops(edge.from) && stops(edge.to)).collect();
+        let begun: Vec<u32> = begins.iter().map(|edge| edge.to).collect();
         // What came just before is overtaken by the event that ends the deployment, and heard behind it. Where that leads nowhere
         // it is told as unhandled.
-        let heard = self.edges.iter().filter(|edge| !stops(edge.from) && stops(edge.to) && !edge.dropped());
-        let heard = heard.map(|edge| edge.to).collect();
+        let heard = begins.iter().filter(|edge| !edge.dropped()).map(|edge| edge.to).collect();
         let stale = self.spread_from(heard, |number, edge| stops(edge.to) && bars[number] == Some(Barred::Closed));
         let stale = (0u32..).zip(stale).filter(|(_, stale)| *stale).map(|(at, _)| at);
         let begun: Vec<u32> = stale.chain(begun).collect();
@@ -164,15 +165,15 @@ impl Graph<'_, '_> {
             let from = edge.from as usize;
             edge.failed() == Failed::Nothing || graph.failed[from] != Failed::Nothing || !goes_well[from]
         };
-        let mut before_well = self.reaching_down(|_, edge| counts(self, edge));
+        let mut before_well = self.reaching_down(arrives, |_, edge| counts(self, edge));
         for barred in [Barred::Again, Barred::Closed, Barred::Gone, Barred::Late, Barred::Reported] {
             // Where nothing is barred so, as much leads down as before.
             if !bars.contains(&Some(barred)) {
                 continue;
             }
-            let after = self.reaching_down(|number, _| bars[number].is_none_or(|of| of > barred));
+            let after = self.reaching_down(arrives, |number, _| bars[number].is_none_or(|of| of > barred));
             let open = |number: usize, edge: &Edge| bars[number].is_none_or(|of| of > barred) && counts(self, edge);
-            let after_well = self.reaching_down(open);
+            let after_well = self.reaching_down(arrives, open);
             let lost = |at: &u32| {
                 let (state, at) = (&self.states[*at as usize], *at as usize);
                 let rests = state.stopping && state.is_at_rest() && comes[at];

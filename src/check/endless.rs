@@ -109,9 +109,9 @@ impl Graph<'_, '_> {
         // Where nothing is known it is not known what is answered, so nothing can be said of cycles.
         let known = |at: u32| self.product.worlds.top(self.states[at as usize].world).is_none();
         let quiet = self.edges.iter().filter(|edge| edge.quiet() && known(edge.from) && known(edge.to));
-        let quiet = quiet.map(|edge| (edge.from, edge.to));
-        let itself: FxHashSet<u32> = quiet.clone().filter(|(from, to)| from == to).map(|(at, _)| at).collect();
-        let quiet = Adjacency::new(self.states.len(), quiet);
+        let quiet: Vec<(u32, u32)> = quiet.map(|edge| (edge.from, edge.to)).collect();
+        let itself: FxHashSet<u32> = quiet.iter().filter(|(from, to)| from == to).map(|(at, _)| *at).collect();
+        let quiet = Adjacency::new(self.states.len(), quiet.iter().copied());
         let component = quiet.components();
         let mut sizes = vec![0u32; component.len()];
         component.iter().for_each(|number| sizes[*number as usize] += 1);

@@ -68,8 +68,9 @@ pub struct Reached {
     open: Frontier,
     /// For each class the shortest ways with nothing worse.
     pub(super) ways: FxHashMap<Failed, Ways>,
-    /// Which steps of the simulated platform's reactions are done on edges on which nothing fails, by the reactions' places.
-    reacts: FxHashMap<u32, Reacts>,
+    /// Which steps of the simulated platform's reactions are done on edges on which nothing fails, by the reactions' places: in the order
+    /// of the edges.
+    reacts: Vec<(u32, u16)>,
     /// Events that let a subsystem go, and come to nothing there.
     pub(super) in_vain: Vec<(u32, EventName)>,
     /// What is told the parent on an edge.
@@ -287,7 +288,8 @@ impl Graph<'_, '_> {
             next.stopping &= so_far.max(class) < Failed::Undo || !self.product.operator.is_empty();
             let to = self.reach(next, so_far.max(class), depth);
             if class == Failed::Nothing && !reacts.is_empty() {
-                self.reached.reacts.insert(u32::try_from(self.reached.edges.len()).unwrap_or(NOWHERE), reacts);
+                let edge = u32::try_from(self.reached.edges.len()).unwrap_or(NOWHERE);
+                self.reached.reacts.extend(reacts.into_iter().map(|reaction| (edge, reaction)));
             }
             let in_vain = told.iter().filter(|name| self.product.is_told_by_child(**name));
             self.reached.in_vain.extend(in_vain.map(|name| (at, *name)));
@@ -339,8 +341,8 @@ impl Graph<'_, '_> {
 
     /// Whether the step of a reaction is done on an edge, as far as nothing fails.
     pub(super) fn sets_off(&self, edge: usize, reaction: usize) -> bool {
-        let of = u32::try_from(edge).ok().and_then(|edge| self.reacts.get(&edge));
-        of.is_some_and(|of| of.iter().any(|at| usize::from(*at) == reaction))
+        let of = u32::try_from(edge).ok().zip(u16::try_from(reaction).ok());
+        of.is_some_and(|of| self.reacts.binary_search(&of).is_ok())
     }
 
     fn is_lean(&self, at: u32) -> bool {

@@ -4,7 +4,7 @@
 use super::coordinator::ask_of;
 use super::explore::Graph;
 use super::judge::{Traced, severity_of};
-use super::state::{Failed, Move};
+use super::state::{Failed, Move, ProductState};
 use super::systems::SystemId;
 use crate::model::codes::COMPOSE_UNLEFT;
 use crate::model::{Ask, ChangeKind, ComponentName, ConfigId, Configuration, Finding, Origin, SubsystemStanding};
@@ -203,11 +203,16 @@ impl Graph<'_, '_> {
                 }
             }
         }
+        // Most edges lead to states to which others lead as well.
+        let is_up = |state: &ProductState| state.is_at_rest() && self.product.all_in(state, |member| member.up);
+        let up: Vec<bool> = self.states.iter().map(is_up).collect();
         let says = |graph: &Self, before: u32, after: u32| {
-            let (before, after) = (&graph.states[before as usize], &graph.states[after as usize]);
-            let pair = |number: usize| (before.leaves[number].index(), after.leaves[number].index());
-            emits.iter().any(|(number, pairs)| pairs.contains(&pair(*number)))
-                || after.is_at_rest() && graph.product.all_in(after, |member| member.up)
+            up[after as usize]
+                || !emits.is_empty() && {
+                    let (before, after) = (&graph.states[before as usize], &graph.states[after as usize]);
+                    let pair = |number: usize| (before.leaves[number].index(), after.leaves[number].index());
+                    emits.iter().any(|(number, pairs)| pairs.contains(&pair(*number)))
+                }
         };
         let ends = |graph: &Self, by: Move| match by {
             Move::Event(at) => graph.product.outside[usize::from(at)] == until,

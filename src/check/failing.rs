@@ -20,7 +20,7 @@ impl Graph<'_, '_> {
         // What operators ask for there is asked for later.
         let waits = || self.product.members.iter().any(|member| state.outstanding(member.by) > 0);
         let heard = state.inbox.is_empty() && state.in_transit.is_empty();
-        heard && !waits() && self.product.all_in(state, |member| member.goal_up())
+        heard && self.product.all_in(state, |member| member.goal_up()) && !waits()
     }
 
     /// Which states a deployment comes to before it is up, or has failed.

@@ -92,11 +92,13 @@ impl Graph<'_, '_> {
             // Where nothing is left, frames are forgotten: they do not pile up.
             edge.failed() <= Failed::Apply && edge.place().is_some() && self.states[edge.to as usize].world != EMPTY
         };
-        let all = self.edges.iter().filter(|edge| fits(edge)).map(|edge| (edge.from, edge.to));
-        let of = Adjacency::new(self.states.len(), all).components();
-        let on_one = |edge: &Edge| fits(edge) && of[edge.from as usize] == of[edge.to as usize];
-        let edges = (0u32..).zip(self.edges.iter()).filter(|(_, edge)| on_one(edge));
-        let edges = Adjacency::new(self.states.len(), edges.map(|(number, edge)| (edge.from, number)));
+        // Whether one fits is looked up once: the states are all over memory.
+        let mut all: Vec<(u32, u32, u32)> = Vec::new();
+        let fitting = (0u32..).zip(self.edges.iter()).filter(|(_, edge)| fits(edge));
+        all.extend(fitting.map(|(number, edge)| (number, edge.from, edge.to)));
+        let of = Adjacency::new(self.states.len(), all.iter().map(|(_, from, to)| (*from, *to))).components();
+        all.retain(|(_, from, to)| of[*from as usize] == of[*to as usize]);
+        let edges = Adjacency::new(self.states.len(), all.iter().map(|(number, from, _)| (*from, *number)));
         Cycles { edges, of }
     }
 

@@ -188,7 +188,8 @@ fn leads_elsewhere(
     // What nobody waits for anywhere is no move.
     let at = product.outside.iter().position(|name| *name == event).and_then(|at| u16::try_from(at).ok());
     let mut walk = Walk { met, good, begins: usize::from(at.is_some()), way: Vec::new() };
-    for after in after {
+    // Most lead there at once.
+    for after in after.into_iter().filter(|after| !is_asked(product, after)).collect::<Vec<_>>() {
         let begins = at.map(|at| (state.clone(), Next::plain(Move::Event(at), after.clone(), Failed::Nothing)));
         walk.way.extend(begins);
         if !walk.leads(product, &after) {

@@ -59,6 +59,9 @@ pub struct Shapes {
     others: OtherFrames,
     /// Of stacks that were met, by what their frames contain.
     known: FxHashMap<Box<[FrameNumber]>, Rc<StackShape>>,
+    /// What comes of the frames that count, by those who have as many frames as may be, and by what is counted in the order in which it
+    /// lies: most stacks differ only in frames that do not count.
+    orderings: FxHashMap<SmallVec<[Requester; 2]>, FxHashMap<Box<[Counted]>, Rc<CountedFrames>>>,
     /// Of frames that were met, by their numbers.
     facts: Vec<Option<FrameFacts>>,
     /// The configurations, in the order of their names.
@@ -86,11 +89,21 @@ struct CountedFrame<'s> {
     counted: Counted,
 }
 
+/// What comes of the frames of a stack that count.
+struct CountedFrames {
+    /// Which of them comes when, in a canonical order.
+    order: Vec<usize>,
+    /// They, in that order.
+    counted: Rc<[Counted]>,
+    /// See [`StackShape`].
+    deep: [Option<ConfigId>; 2],
+}
+
 /// What of a stack counts: always the same for frames that contain the same.
 #[derive(Debug)]
 pub struct StackShape {
     /// The frames that count, in a canonical order.
-    pub counted: Box<[Counted]>,
+    pub counted: Rc<[Counted]>,
     /// Their places on the stack.
     places: Box<[u16]>,
     /// A configuration of which one requester has more than [`limits::CHECK_FRAMES`] frames.
@@ -177,12 +190,26 @@ impl Shapes {
             });
             kept.push(CountedFrame { frame, place, rank: own.rank, counted: (number, under) });
         }
-        let order = self.canonical(stack, &kept);
-        let counted = order.iter().map(|at| kept[*at].counted).collect();
+        let frames = self.counted_frames(stack, &kept);
+        let CountedFrames { order, counted, deep: [deep, left] } = &*frames;
         let places = order.iter().map(|at| u16::try_from(kept[*at].place).unwrap_or(u16::MAX)).collect();
-        let own = frames.iter().zip(&facts).filter(|(_, facts)| facts.noted.counts).map(|(frame, _)| frame);
-        let [deep, left] = more_than([limits::CHECK_FRAMES, limits::CHECK_LEFT], own);
-        StackShape { counted, places, deep, left }
+        StackShape { counted: counted.clone(), places, deep: *deep, left: *left }
+    }
+
+    /// What comes of the frames that count: worked out once for those that contain the same, to which the same is done.
+    fn counted_frames(&mut self, stack: &Stack, kept: &[CountedFrame<'_>]) -> Rc<CountedFrames> {
+        let full = full(stack, kept);
+        let lie: SmallVec<[Counted; 64]> = kept.iter().map(|frame| frame.counted).collect();
+        let known = self.orderings.get(&full).and_then(|of| of.get(&lie[..]));
+        known.cloned().unwrap_or_else(|| {
+            let order = self.canonical(&full, kept);
+            let counted = order.iter().map(|at| lie[*at]).collect();
+            let most = [limits::CHECK_FRAMES, limits::CHECK_LEFT];
+            let deep = more_than(most, kept.iter().map(|frame| frame.frame));
+            let frames = Rc::new(CountedFrames { order, counted, deep });
+            self.orderings.entry(full).or_default().insert(lie[..].into(), frames.clone());
+            frames
+        })
     }
 
     /// Of each frame which of those above it do not count.
@@ -223,28 +250,18 @@ impl Shapes {
     }
 
     /// The order in which frames that count are taken: of those that could as well lie at the bottom, always that with the least name.
-    fn canonical(&mut self, stack: &Stack, kept: &[CountedFrame<'_>]) -> Vec<usize> {
+    /// `filling`: whose oldest may have to be squashed, these go first.
+    fn canonical(&mut self, filling: &[Requester], kept: &[CountedFrame<'_>]) -> Vec<usize> {
         if self.undone.in_order {
             return (0..kept.len()).collect();
         }
-        // Where it may come to squashing, the oldest go first. A stack that is not half full is far from that.
-        let mut known: SmallVec<[(Requester, bool); 4]> = SmallVec::new();
-        let mut filling = |by: Requester| {
-            let one = known.iter().find(|(of, _)| *of == by).copied().unwrap_or_else(|| {
-                let own = stack.frames().iter().filter(|frame| frame.requester == by).count();
-                let full = !stack.has_room(by, own);
-                known.push((by, full));
-                (by, full)
-            });
-            one.1
-        };
         let alone = kept.iter().all(|frame| frame.frame.requester == kept[0].frame.requester);
         // Of each how many have to go first, and which it keeps waiting.
         let mut waits: Vec<usize> = vec![0; kept.len()];
         let mut behind: Vec<SmallVec<[usize; 2]>> = vec![SmallVec::new(); kept.len()];
         for (at, below) in kept.iter().enumerate() {
             let by = below.frame.requester;
-            let full = filling(by);
+            let full = filling.contains(&by);
             let mut in_row = !full;
             for (other, above) in kept.iter().enumerate().skip(at + 1) {
                 let next = !in_row && above.frame.requester == by;
@@ -299,6 +316,20 @@ impl Shapes {
             && (a.configuration == b.configuration || self.undone.bare.contains(&a.requester));
         !one_name && !self.frames.share((a, one.counted.0), (b, other.counted.0))
     }
+}
+
+/// Those of whose frames it may come to squashing. A stack that is not half full is far from that.
+fn full(stack: &Stack, kept: &[CountedFrame<'_>]) -> SmallVec<[Requester; 2]> {
+    let mut full: SmallVec<[Requester; 2]> = SmallVec::new();
+    let mut met: SmallVec<[Requester; 4]> = SmallVec::new();
+    for by in kept.iter().map(|frame| frame.frame.requester) {
+        if !met.contains(&by) {
+            met.push(by);
+            let own = stack.frames().iter().filter(|frame| frame.requester == by).count();
+            full.extend((!stack.has_room(by, own)).then_some(by));
+        }
+    }
+    full
 }
 
 /// Of each of these bounds, a configuration of which one requester has more frames than that. Those of another one come of

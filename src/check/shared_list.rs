@@ -65,13 +65,26 @@ impl<T: Clone> SharedList<T> {
     /// # Panics
     /// There is none.
     pub fn remove(&mut self, at: usize) -> T {
-        self.change(|list| list.remove(at))
+        // The list of others is not copied to be emptied.
+        match (self.as_slice(), at) {
+            ([one], 0) => {
+                let one = one.clone();
+                self.clear();
+                one
+            }
+            _ => self.change(|list| list.remove(at)),
+        }
     }
 
-    /// Only those of which this is true. Where it is of all, nothing is copied.
+    /// Only those of which this is true. Where it is of all, or of none, nothing is copied.
     pub fn retain(&mut self, stays: impl Fn(&T) -> bool) {
-        if !self.iter().all(&stays) {
+        if self.iter().all(&stays) {
+            return;
+        }
+        if self.iter().any(&stays) {
             self.change(|list| list.retain(|one| stays(one)));
+        } else {
+            self.clear();
         }
     }
 

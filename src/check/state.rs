@@ -98,6 +98,10 @@ impl ProductState {
 
     /// Batches of a requester that are not answered. That it has come to *down* once counts for nothing.
     pub fn outstanding(&self, by: Requester) -> usize {
+        // Most states have nothing.
+        if self.desk.is_empty() && self.seldom.is_nothing() {
+            return 0;
+        }
         let first = |batch: &&Batch| batch.requests.first().is_some_and(|request| request.requester == by);
         let under_way = self.desk.under_way().iter().map(|active| &active.batch);
         let (mut downs, mut batches) = (0_usize, 0);

@@ -35,7 +35,7 @@ pub enum Slot {
 pub struct HeldName(u64);
 
 impl HeldName {
-    fn of(name: &str) -> Self {
+    pub(crate) fn of(name: &str) -> Self {
         Self(FxBuildHasher.hash_one(name))
     }
 }
