@@ -9,7 +9,8 @@ use super::product::Product;
 use super::reactions::triggers;
 use super::state::{Move, ProductState};
 use super::uncertain::fails;
-use crate::model::{Ask, EventName, Monitor, SubsystemStanding, Verdict};
+use crate::model::{Ask, EventName, Monitor, Origin, SubsystemStanding, Verdict};
+use crate::system::View as _;
 use crate::statechart::EventId;
 
 impl Product<'_> {
@@ -37,7 +38,7 @@ impl Product<'_> {
     }
 
     /// The events that are followed as one from outside, since no coordinator tells them apart.
-    pub(super) fn alike_to(&self, at: u16) -> impl Iterator<Item = EventName> + '_ {
+    pub(super) fn alike_to(&self, at: u16) -> impl Iterator<Item = EventName> + Clone + '_ {
         let alike = (0..self.outside.len()).filter(move |other| self.alike[*other] == usize::from(at));
         alike.map(|other| self.outside[other])
     }
@@ -63,13 +64,16 @@ impl Product<'_> {
             let by = Move::Event(u16::try_from(*at).unwrap_or(u16::MAX));
             !self.is_first_or_last(by) && self.raises_while_stopping(by) == Raises::Nobody
         };
-        let heard = |(_, name): &(usize, &EventName)| {
-            self.members.iter().zip(&state.leaves).any(|(member, leaf)| {
-                let event = member.chart.event(**name);
-                event != EventId::OTHER && triggers(member.chart, *leaf).0.contains(&event)
-            })
-        };
+        let heard = |(_, name): &(usize, &EventName)| self.listens(state, **name).is_some();
         self.outside.iter().enumerate().filter(leads).filter(heard).map(|(_, name)| *name).collect()
+    }
+
+    /// The coordinator that waits for an event where it is.
+    pub(super) fn listens(&self, state: &ProductState, name: EventName) -> Option<usize> {
+        self.members.iter().zip(&state.leaves).position(|(member, leaf)| {
+            let event = member.chart.event(name);
+            event != EventId::OTHER && triggers(member.chart, *leaf).0.contains(&event)
+        })
     }
 
     /// The event that a move brings from outside; empty: it brings none.
@@ -104,6 +108,22 @@ impl Product<'_> {
                 || !stopping && (child.down == name || child.leaves == Some(name))
         };
         fails(name) || self.is_reported(name) || self.children.iter().any(tells)
+    }
+
+    /// The event that a move brings from outside, where nothing in the deployment raises it: people do, or somebody's program.
+    pub(super) fn raised_by_hand(&self, state: &ProductState, by: Move) -> Option<EventName> {
+        let Move::Event(at) = by else { return None };
+        let deployment = self.deployment;
+        let listed = |list: &[(EventName, Origin)], name: EventName| list.iter().any(|(event, _)| *event == name);
+        let world = self.worlds.get(state.world)?;
+        let known = |name: EventName| {
+            let mut raised = self.from_outside[usize::from(at)].told_between || self.is_reported(name) || self.is_told_by_child(name);
+            world.system.for_each_component(&mut |node| raised |= node.ty.raises.keys().any(|event| *event == name));
+            raised || fails(name) || listed(&deployment.interface.accepts, name) || listed(&deployment.safety, name)
+        };
+        // What is followed as one is raised where one of them is.
+        let mut alike = self.alike_to(at);
+        if alike.clone().any(known) { None } else { alike.next() }
     }
 
     fn may_raise(&self, name: EventName) -> Raises {

@@ -20,6 +20,7 @@ pub const FOLLOWED: &[Code] = &[
     COORD_SAFETY_UNHEARD,
     // The bring-up and the shutdown.
     DEPLOY_NEVER_UP,
+    DEPLOY_BY_HAND,
     DEPLOY_NEVER_DOWN,
     DEPLOY_LEFTOVERS,
     // Why a request is refused, or can only fail.

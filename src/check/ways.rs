@@ -11,7 +11,7 @@ use super::timers::Timer;
 use super::trace::TraceStep;
 use super::tried::{Goal, Way};
 use crate::limits;
-use crate::model::codes::{DEPLOY_LEFTOVERS, DEPLOY_NEVER_DOWN, DEPLOY_NEVER_UP, STACK_SQUASHED};
+use crate::model::codes::{DEPLOY_BY_HAND, DEPLOY_LEFTOVERS, DEPLOY_NEVER_DOWN, DEPLOY_NEVER_UP, STACK_SQUASHED};
 use crate::model::{Catalogue, Code, Deployment, Finding, Origin, Severity};
 use crate::statechart::{Chart, NodeId};
 use std::collections::BTreeSet;
@@ -43,6 +43,9 @@ pub fn ways(product: &mut Product<'_>) -> Traced {
         up.push(stops(product, &rise, DEPLOY_NEVER_UP, "deploy.up", |member| member.goal_up(), "the bring-up"));
     }
     up.extend(late(product, &rise, DEPLOY_NEVER_UP, "deploy.within_s", "the bring-up"));
+    if rise.reached {
+        up.extend(by_hand(product, &rise));
+    }
     let mut down = fall.as_ref().map(reasons).unwrap_or_default();
     if let Some(fall) = &fall {
         down.extend(late(product, fall, DEPLOY_NEVER_DOWN, "shutdown.within_s", "the shutdown"));
@@ -199,6 +202,28 @@ fn stops(product: &Product<'_>, way: &Way, code: Code, key: &str, goal: Goal, wh
         None => format!("look at the trace: which event does {several}?"),
     });
     finding.help(help).at(deployment.key_origin(key)).path(key)
+}
+
+/// That the bring-up goes on only when somebody raises an event: nothing in the deployment does. Mostly it is misspelt.
+fn by_hand(product: &Product<'_>, rise: &Way) -> Option<Finding> {
+    let deployment = product.deployment;
+    let before = std::iter::once(&rise.from).chain(rise.moves.iter().map(|next| &next.state));
+    let (state, event) = before.zip(&rise.moves).find_map(|(state, next)| {
+        let event = product.raised_by_hand(state, next.by)?;
+        (event != deployment.deploy.event).then_some((state, event))
+    })?;
+    let place = product.place(state);
+    let hears = product.listens(state, event);
+    let leaf = hears.map_or(Origin::NONE, |number| product.members[number].chart.origin(state.leaves[number]));
+    let message = format!("the bring-up waits in `{place}` for `{event}`, which nothing here raises");
+    let help = format!(
+        "is it an answer, as `ID.ok`, that leads on? If people raise it, name in `deploy.up` where it waits for them; else it fails {} s after \
+         `{}`",
+        deployment.deploy.within.as_secs_f64(),
+        deployment.deploy.event
+    );
+    let finding = Finding::warning(DEPLOY_BY_HAND, message).help(help);
+    Some(finding.also(leaf, "waits here").at(deployment.key_origin("deploy.up")).path("deploy.up"))
 }
 
 /// The subsystems that nobody ever tells what begins them, or ends them: what to do about it. Of one file only its own are asked for.
