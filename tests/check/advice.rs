@@ -84,36 +84,6 @@ fn an_operator_is_not_blamed_for_the_frames_of_a_coordinator() {
     assert!(own.iter().filter(full).all(|f| f["severity"] == "warning"), "{:#}", said.0);
 }
 
-/// Of two frames of one configuration the coordinator undoes one, and takes it for all.
-#[test]
-fn that_another_frame_of_it_is_there_is_told_to_who_has_undone_one() {
-    let help = |group: &str| {
-        let configurations =
-            CONFIGURATIONS.replace("soft = Configuration { ", &format!("soft = Configuration {{ {group} "));
-        let states = format!(
-            "{STATES} trying = state {{ entry = \"soft\" }}, held = state {{}}, going = state {{ entry = \"soft.undo\" }},
-             trans {{ src = \"up\", tgt = \"trying\", events = {{ \"e_soft\" }} }},
-             trans {{ src = \"trying\", tgt = \"held\", events = {{ \"soft.ok\" }} }},
-             trans {{ src = \"trying\", tgt = \"stuck\", events = {{ \"soft.failed\", \"soft.broken\" }} }},
-             trans {{ src = \"held\", tgt = \"trying\", events = {{ \"e_soft\" }} }},
-             trans {{ src = \"held\", tgt = \"going\", events = {{ \"e_shutdown\" }} }},
-             trans {{ src = \"going\", tgt = \"leaving\", events = {{ \"soft.undone\" }} }},
-             trans {{ src = \"going\", tgt = \"stuck\", events = {{ \"soft.undo.failed\", \"soft.undo.broken\" }} }},"
-        );
-        let said = Small::new(&configurations, &states, "").check();
-        let refused = texts(&said, "coord::request_refused");
-        refused
-            .iter()
-            .filter(|(_, help)| help.contains("two frames"))
-            .map(|(_, help)| (*help).to_owned())
-            .collect::<Vec<_>>()
-    };
-    let once_more = "two frames of `soft` were in force, and `soft.undone` tells of one: let it lead to `soft.undo` once more, or give \
-                     `soft` a `group` of its own, so that it takes the place of the one in force";
-    assert_eq!(help(""), [once_more]);
-    assert!(help("group = \"soft\",").is_empty());
-}
-
 #[test]
 fn a_near_event_is_a_slip_where_it_is_near_enough_and_nobody_declares_it() {
     let listens = |events: &[&str], keys: &str| {
