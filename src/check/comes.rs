@@ -79,8 +79,8 @@ impl Worlds<'_> {
         });
         let stopped = stopped.collect();
         let hollow = self.hollow(done.world, &group, planned.as_ref());
-        let (group, ends) = (DecidedGroup::of(&group), OnceCell::new());
-        Comes { group, refused, hollow, warnings, holds, can_fail, done, stopped, ends }
+        let (group, ends, interrupted) = (DecidedGroup::of(&group), OnceCell::new(), OnceCell::new());
+        Comes { group, refused, hollow, warnings, holds, can_fail, done, stopped, ends, interrupted }
     }
 
     /// The requests of a group that say what is false in the world in which all of it is done.

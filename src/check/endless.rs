@@ -108,10 +108,13 @@ impl Graph<'_, '_> {
     fn cycles(&self) -> Vec<Vec<u32>> {
         // Where nothing is known it is not known what is answered, so nothing can be said of cycles.
         let known = |at: u32| self.product.worlds.top(self.states[at as usize].world).is_none();
-        let quiet = self.edges.iter().filter(|edge| edge.quiet() && known(edge.from) && known(edge.to));
-        let quiet: Vec<(u32, u32)> = quiet.map(|edge| (edge.from, edge.to)).collect();
-        let itself: FxHashSet<u32> = quiet.iter().filter(|(from, to)| from == to).map(|(at, _)| *at).collect();
-        let quiet = Adjacency::new(self.states.len(), quiet.iter().copied());
+        let is_quiet = |edge: &Edge| edge.quiet() && known(edge.from) && known(edge.to);
+        let mut quiet: Vec<u32> = Vec::with_capacity(self.edges.len());
+        quiet.extend((0u32..).zip(self.edges.iter()).filter(|(_, edge)| is_quiet(edge)).map(|(number, _)| number));
+        let ends = |number: &u32| (self.edges[*number as usize].from, self.edges[*number as usize].to);
+        let quiet = quiet.iter().map(ends);
+        let itself: FxHashSet<u32> = quiet.clone().filter(|(from, to)| from == to).map(|(at, _)| at).collect();
+        let quiet = Adjacency::new(self.states.len(), quiet);
         let component = quiet.components();
         let mut sizes = vec![0u32; component.len()];
         component.iter().for_each(|number| sizes[*number as usize] += 1);

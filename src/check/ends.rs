@@ -2,7 +2,7 @@
 
 use super::desks::AnsweredPlaces;
 use super::kept::KeptValue;
-use super::outcome::{Comes, EndsSo, Went, WorldId};
+use super::outcome::{Comes, EndsSo, InterruptedSo, Went, WorldId};
 use super::product::{Product, as_begun};
 use super::seldom::Unconfirmed;
 use super::state::{Answers, Failed, Move, Next, Nexts, ProductState, Trouble};
@@ -334,21 +334,40 @@ impl Product<'_> {
         let parts = comes.group.places().enumerate();
         let given_up: SmallVec<[usize; 2]> =
             parts.filter(|(_, place)| given_up.contains(place)).map(|(part, _)| part).collect();
-        let group = comes.group.group();
         // What was being undone stays; a configuration that is not applied is as if it had not been asked for.
         let undo = (0..comes.can_fail.len()).any(|part| comes.undoes(part, requests));
         let class = if undo { Failed::Undo } else { Failed::Nothing };
-        for endings in endings(&comes.can_fail, Stopping::Safe(&given_up), self.tells_all) {
-            let settled = settle(requests, &group, &endings, Stopped::Safe);
-            let given = self.desks.given(given(&settled));
-            if endings.contains(&Ending::Broken) {
-                self.broke(state, number, requests, given, nexts);
+        let ways = match given_up.is_empty() {
+            true => comes.interrupted.get_or_init(|| self.ways_interrupted(requests, &comes, &[])).clone(),
+            false => self.ways_interrupted(requests, &comes, &given_up),
+        };
+        for InterruptedSo { broken, stay, given } in ways.iter() {
+            if *broken {
+                self.broke(state, number, requests, given.clone(), nexts);
                 continue;
             }
-            let stay = settled.stay.iter().map(|(place, _)| requests[*place]);
+            let stay = stay.iter().map(|place| requests[*place]);
             let went = self.worlds.stay(state.world, planned, stay, &[]);
-            self.ended(state, number, &End { went: &went, given, class }, nexts);
+            self.ended(state, number, &End { went: &went, given: given.clone(), class }, nexts);
         }
+    }
+
+    /// How a batch may end that a safe configuration has interrupted, of which these parts were given up: always the same where it
+    /// comes to the same.
+    fn ways_interrupted(
+        &self,
+        requests: &[Request],
+        comes: &Comes,
+        given_up: &[usize],
+    ) -> KeptValue<Vec<InterruptedSo>> {
+        let group = comes.group.group();
+        let so = |endings: Endings| {
+            let settled = settle(requests, &group, &endings, Stopped::Safe);
+            let (broken, given) = (endings.contains(&Ending::Broken), self.desks.given(given(&settled)));
+            InterruptedSo { broken, stay: settled.stay.iter().map(|(place, _)| *place).collect(), given }
+        };
+        let ways = endings(&comes.can_fail, Stopping::Safe(given_up), self.tells_all);
+        self.worlds.interrupted.keep(ways.into_iter().map(so).collect())
     }
 
     /// How a safe configuration may end.

@@ -46,6 +46,8 @@ pub struct Reached {
     pub edges: Chunks<Edge>,
     /// The moves that do, and why they lead none down that is being stopped.
     moves: IndexMap<Move, Option<Barred>, FxBuildHasher>,
+    /// That of the edge before, and its number.
+    last_move: Option<(Move, u32)>,
     /// What is wrong, and where.
     pub troubles: Vec<(u32, Trouble)>,
     /// What planning warns of, and where.
@@ -322,9 +324,17 @@ impl Graph<'_, '_> {
     }
 
     fn moved(&mut self, by: Move) -> u32 {
+        // Mostly there are several answers one after the other.
+        if let Some((last, number)) = self.last_move
+            && last == by
+        {
+            return number;
+        }
         let known = self.moves.get_index_of(&by);
         let number = known.unwrap_or_else(|| self.reached.moves.insert_full(by, self.product.barred(by)).0);
-        u32::try_from(number).unwrap_or(NOWHERE)
+        let number = u32::try_from(number).unwrap_or(NOWHERE);
+        self.last_move = Some((by, number));
+        number
     }
 
     /// A cycle is gone round so often that it leads there.

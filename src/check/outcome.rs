@@ -85,6 +85,19 @@ pub struct Comes {
     pub(super) stopped: Box<[(Went, Option<Went>)]>,
     /// How it may end where nothing stops it, once that was asked.
     pub(super) ends: OnceCell<KeptValue<Vec<EndsSo>>>,
+    /// How it may end where a safe configuration interrupts it, and nothing of it was given up.
+    pub(super) interrupted: OnceCell<KeptValue<Vec<InterruptedSo>>>,
+}
+
+/// One way in which the first requests of a batch may end where a safe configuration interrupts them.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub struct InterruptedSo {
+    /// Something of them is left in between.
+    pub broken: bool,
+    /// The places of the undos whose frames stay.
+    pub stay: SmallVec<[usize; 2]>,
+    /// Who is answered what.
+    pub given: KeptValue<AnsweredPlaces>,
 }
 
 /// One way in which the first requests of a batch may end.

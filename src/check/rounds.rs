@@ -93,12 +93,13 @@ impl Graph<'_, '_> {
             edge.failed() <= Failed::Apply && edge.place().is_some() && self.states[edge.to as usize].world != EMPTY
         };
         // Whether one fits is looked up once: the states are all over memory.
-        let mut all: Vec<(u32, u32, u32)> = Vec::new();
-        let fitting = (0u32..).zip(self.edges.iter()).filter(|(_, edge)| fits(edge));
-        all.extend(fitting.map(|(number, edge)| (number, edge.from, edge.to)));
-        let of = Adjacency::new(self.states.len(), all.iter().map(|(_, from, to)| (*from, *to))).components();
-        all.retain(|(_, from, to)| of[*from as usize] == of[*to as usize]);
-        let edges = Adjacency::new(self.states.len(), all.iter().map(|(number, from, _)| (*from, *number)));
+        let mut all: Vec<u32> = Vec::with_capacity(self.edges.len());
+        all.extend((0u32..).zip(self.edges.iter()).filter(|(_, edge)| fits(edge)).map(|(number, _)| number));
+        let edge = |number: &u32| &self.edges[*number as usize];
+        let ends = |number: &u32| (edge(number).from, edge(number).to);
+        let of = Adjacency::new(self.states.len(), all.iter().map(ends)).components();
+        all.retain(|number| of[edge(number).from as usize] == of[edge(number).to as usize]);
+        let edges = Adjacency::new(self.states.len(), all.iter().map(|number| (edge(number).from, *number)));
         Cycles { edges, of }
     }
 

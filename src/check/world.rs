@@ -9,7 +9,7 @@
 
 use super::desks::PlainBatch;
 use super::kept::KeptValues;
-use super::outcome::{Comes, ConcurrentWork, EndsSo, Held, SafeComes, Went, Whose, WorldId};
+use super::outcome::{Comes, ConcurrentWork, EndsSo, Held, InterruptedSo, SafeComes, Went, Whose, WorldId};
 use super::shape::{Shapes, StackShape, Undone};
 use super::systems::{SystemId, Systems};
 use crate::model::{Ask, Catalogue, ConfigId, Configuration, Deployment, RequestId};
@@ -76,6 +76,8 @@ pub struct Worlds<'a> {
     safes: FxHashMap<(WorldId, Request, Held), Rc<SafeComes>>,
     /// How batches may end: many may so in many worlds.
     pub(super) ends: KeptValues<Vec<EndsSo>>,
+    /// The same where a safe configuration interrupts them.
+    pub(super) interrupted: KeptValues<Vec<InterruptedSo>>,
     /// Frames that batches under way pop or hand over to, and those that stay though their undo was asked for.
     pub(super) helds: FxHashMap<(WorldId, PlainBatch, ConcurrentWork), (Held, Held)>,
     pub(super) withouts: FxHashMap<(WorldId, SmallVec<[Whose; 2]>), Option<Went>>,
@@ -107,6 +109,7 @@ impl<'a> Worlds<'a> {
             comes: FxHashMap::default(),
             safes: FxHashMap::default(),
             ends: KeptValues::default(),
+            interrupted: KeptValues::default(),
             helds: FxHashMap::default(),
             withouts: FxHashMap::default(),
             asked: FxHashSet::default(),

@@ -45,6 +45,9 @@ impl Stack {
         batch.requests.iter().find(|request| own(request))?;
         let loose = self.frames.iter().filter(|frame| is_loose(frame, led) && outside(led, frame).is_none());
         let mut open: Vec<Claim> = loose.map(|frame| claims.of_frame(frame)).collect();
+        if open.is_empty() {
+            return None;
+        }
         let (mut about, mut along) = (claims.of(&batch.requests), None);
         while let Some(at) = open.iter().position(|frame| frame.meets(&about)) {
             let frame = open.swap_remove(at);
