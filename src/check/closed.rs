@@ -10,8 +10,8 @@ use super::reactions::triggers;
 use super::state::{Move, ProductState};
 use super::uncertain::fails;
 use crate::model::{Ask, EventName, Monitor, Origin, SubsystemStanding, Verdict};
-use crate::system::View as _;
 use crate::statechart::EventId;
+use crate::system::View as _;
 
 impl Product<'_> {
     /// What is known of each event from outside.
@@ -117,7 +117,9 @@ impl Product<'_> {
         let listed = |list: &[(EventName, Origin)], name: EventName| list.iter().any(|(event, _)| *event == name);
         let world = self.worlds.get(state.world)?;
         let known = |name: EventName| {
-            let mut raised = self.from_outside[usize::from(at)].told_between || self.is_reported(name) || self.is_told_by_child(name);
+            let mut raised = self.from_outside[usize::from(at)].told_between
+                || self.is_reported(name)
+                || self.is_told_by_child(name);
             world.system.for_each_component(&mut |node| raised |= node.ty.raises.keys().any(|event| *event == name));
             raised || fails(name) || listed(&deployment.interface.accepts, name) || listed(&deployment.safety, name)
         };

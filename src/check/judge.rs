@@ -3,7 +3,6 @@
 use super::coordinator::place;
 use super::explore::Graph;
 use super::state::{Failed, Move, Next, ProductState, Trouble};
-use super::told::still_there;
 use super::trace::TraceStep;
 use crate::limits;
 use crate::model::codes::{
@@ -82,15 +81,12 @@ impl Graph<'_, '_> {
             if !worse(severity_of(class)) || !judged.insert((told.clone(), world, class)) {
                 continue;
             }
-            let mut finding = self.refused(at, &request, &reasons);
+            let finding = self.refused(at, &request, &reasons);
             if !worse(finding.severity) {
                 continue;
             }
             said.insert(told, finding.severity);
             let mut trace = self.trace(at);
-            if let Some(world) = self.product.worlds.get(self.states[at as usize].world) {
-                finding.help = still_there(world.stack.frames(), &request, first, &trace).or(finding.help);
-            }
             if let Some(last) = trace.last_mut() {
                 // Beside what it is carried out with it is answered when that is.
                 let within = self.runs_out(at, &request).unwrap_or_default().max(limits::REPLAY_STEP * 2);

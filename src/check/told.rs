@@ -3,12 +3,9 @@
 use super::arrive::is_for_somebody;
 use super::product::Product;
 use super::state::{Move, Next, ProductState};
-use super::trace::{Answered, Happened, HeardEvent, Place, TraceStep};
-use crate::model::codes::STACK_SHARED;
-use crate::model::{Ask, EventName, Finding, Verdict};
-use crate::stack::{Frame, Request};
+use super::trace::{Answered, Happened, HeardEvent, Place};
+use crate::model::{Ask, EventName, Verdict};
 use crate::statechart::{EventId, NodeId};
-use std::sync::Arc;
 
 impl Product<'_> {
     /// Where all coordinators are.
@@ -126,24 +123,4 @@ impl Product<'_> {
             Move::Rounds => Happened::Rounds { times: self.deployment.limits.stack },
         }
     }
-}
-
-/// What to do where a request is refused because of a frame whose configuration was taken back on the way, and that is another one of it.
-pub fn still_there(frames: &[Arc<Frame>], by: &Request, why: &Finding, way: &[TraceStep]) -> Option<String> {
-    let last = |event: String| way.iter().rposition(|step| step.hears.iter().any(|heard| heard.event == event));
-    let named = |frame: &&Arc<Frame>| why.message.contains(&format!("before `{}`", frame.configuration));
-    let own = frames.iter().filter(|frame| frame.requester == by.requester && why.code == STACK_SHARED);
-    let frame = own.rev().find(named)?;
-    let id = frame.configuration;
-    let (undo, done) = (Verdict::Undone.event(Ask::UndoOf(id)), Verdict::Ok.event(Ask::Apply(id)));
-    // Whoever has heard of it since takes it for gone.
-    (last(undo.to_string())? > last(done.to_string())?).then(|| {
-        let group = match frame.group {
-            Some(_) => String::new(),
-            None => format!(", or give `{id}` a `group` of its own, so that it takes the place of the one in force"),
-        };
-        format!(
-            "two frames of `{id}` were in force, and `{undo}` tells of one: let it lead to `{id}.undo` once more{group}"
-        )
-    })
 }

@@ -377,6 +377,11 @@ impl Engine {
     pub(super) fn answer_undos(&mut self, gone: Gone, reason: Option<&Reason>) {
         for (undo, verdict) in gone.undone {
             let reason = reason.cloned().filter(|_| verdict == Verdict::UndoBroken);
+            if verdict == Verdict::UndoBroken {
+                // What is left of it.
+                let held = self.held_frames();
+                self.world.stays(&undo, &held);
+            }
             self.answer(undo, verdict, reason);
         }
         for undo in gone.late {

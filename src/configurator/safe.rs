@@ -110,19 +110,22 @@ impl Engine {
         (steps, numbers)
     }
 
-    /// The state of a safe configuration that is not there yet has been left, and the undo is not carried out.
+    /// A safe configuration that is not there yet is let go of, and the undo is not carried out.
     pub(super) fn leaves_coming(&mut self, undo: &Request) {
         let applied = self.running.iter_mut().rev().filter_map(|running| match &mut running.purpose {
-            Purpose::Safe(safe) => Some(&mut **safe),
+            Purpose::Safe(safe) => Some(&mut safe.0),
             _ => None,
         });
-        for (request, frame, _) in applied {
-            if undo.leaves(std::iter::once(request)).is_some() {
-                (frame.scope, frame.left) = (None, true);
-                return;
+        // Those under way came before those that wait.
+        let Some(left) = undo.leaves(applied.chain(self.safety.waiting.iter_mut())).map(|left| left.id) else { return };
+        let of_it = |safe: &(Request, Frame, Touched)| safe.0.id == left;
+        for running in &mut self.running {
+            if let Purpose::Safe(safe) = &mut running.purpose
+                && of_it(safe)
+            {
+                (safe.1.scope, safe.1.left) = (None, true);
             }
         }
-        let _ = undo.leaves(self.safety.waiting.iter_mut());
     }
 
     /// Values on their way to the platform, of steps that were interrupted.
@@ -224,7 +227,10 @@ impl Engine {
             let later = self.running.iter().filter(|other| other.after.contains(&number));
             let served: Vec<_> = later.flat_map(|other| other.serves.iter().copied()).collect();
             for troubled in self.safety.troubles.iter_mut().filter(|other| served.contains(&other.request)) {
-                troubled.reasons.push(Reason::Broken(part.residual.clone()));
+                let why = Reason::Broken(part.residual.clone());
+                if !troubled.reasons.contains(&why) {
+                    troubled.reasons.push(why);
+                }
                 troubled.missed.extend(missed.iter().cloned());
             }
         }

@@ -123,18 +123,22 @@ impl Request {
     /// Whether a coordinator lets go of a frame of that configuration by this undo: by leaving the state that the frame belongs to, or by
     /// naming one that belongs to none.
     pub fn lets_go_of(&self, frame: &Frame) -> bool {
-        let coordinator = self.scope.is_some() || matches!(self.requester, Requester::Coordinator(_));
-        let asked = self.why == Why::Asked && !self.gone && coordinator;
-        asked && (frame.scope, frame.requester) == (self.scope, self.requester)
+        self.lets_go() && (frame.scope, frame.requester) == (self.scope, self.requester)
     }
 
-    /// An undo by leaving a state is not carried out, and there is no frame of that visit: it is of a safe configuration that is still
-    /// `coming` (the oldest first), and that nobody asks for any more.
-    pub fn leaves<'r>(&self, coming: impl Iterator<Item = &'r mut Self>) -> Option<&'r mut Self> {
+    fn lets_go(&self) -> bool {
+        let coordinator = self.scope.is_some() || matches!(self.requester, Requester::Coordinator(_));
+        self.why == Why::Asked && !self.gone && coordinator
+    }
+
+    /// An undo by which a coordinator lets go of something is not carried out, and there is no frame of it: it is of a safe configuration that
+    /// is still `coming` (the oldest first), and that nobody asks for any more. Visits are left in their order; by its name the newest is meant.
+    pub fn leaves<'r>(&self, coming: impl DoubleEndedIterator<Item = &'r mut Self>) -> Option<&'r mut Self> {
         let Ask::UndoOf(id) = self.ask else { return None };
-        let of = |r: &Self| (r.ask, r.scope, r.requester) == (Ask::Apply(id), self.scope, self.requester) && !r.gone;
-        let mut coming = coming.filter(|_| self.scope.is_some() && !self.gone);
-        let left = coming.find(|request| of(request))?;
+        let of =
+            |r: &&'r mut Self| (r.ask, r.scope, r.requester) == (Ask::Apply(id), self.scope, self.requester) && !r.gone;
+        let mut coming = coming.filter(|_| self.lets_go());
+        let left = if self.scope.is_some() { coming.find(of) } else { coming.rfind(of) }?;
         left.gone = true;
         Some(left)
     }

@@ -303,7 +303,7 @@ fn an_event_that_nobody_can_mean_is_told() {
             "`after(5)` is no time event: somebody must raise it under that very name; did you mean `e_after(5)`?",
         ),
         ("E_at(3)", "`E_at(3)` is no time event: somebody must raise it under that very name; did you mean `e_at(3)`?"),
-        ("aa.faulted", "`aa.faulted` never comes: there is no component `aa`; did you mean `a`?"),
+        ("aa.faulted", "`aa.faulted` never comes: there is no component `aa`; did you mean `a.faulted`?"),
     ];
     for (event, told) in cases {
         let more = format!("trans {{ src = \"stuck\", tgt = \"leaving\", events = {{ \"{event}\" }} }},");

@@ -369,6 +369,13 @@ fn coordinators() -> Vec<Row> {
             &["base.ok"],
         ),
         row(
+            "deploy::by_hand",
+            "the bring-up waits in `root.building` for `e_base`",
+            Small::new(BASE, &without("tgt = 'up', events = { 'base.ok' }", "tgt = 'up', events = { 'e_base' }"), ""),
+            "wait(2) wait_state('up', 0)",
+            &["base.ok"],
+        ),
+        row(
             "deploy::never_down",
             "the shutdown stops",
             Small::new(BASE, &without("trans { src = 'leaving', tgt = 'idle', events = { 'base.undone' } },", ""), ""),

@@ -655,3 +655,36 @@ fn a_way_that_only_failures_open_hides_no_state_without_one() {
         assert!(message.starts_with("from `root.life.up` only a second `e_shutdown` leads down"), "{message}");
     }
 }
+
+/// Nobody is there to raise it, unless it is listed as one that comes from outside, or a reaction does.
+#[test]
+fn a_bring_up_that_waits_for_what_nothing_raises_is_told() {
+    let life = |event: &str| {
+        format!(
+            "idle = state {{}}, building = state {{ entry = 'base' }}, warming = state {{}}, up = state {{}},
+             leaving = state {{ entry = 'base.undo' }},
+             trans {{ src = 'initial', tgt = 'idle' }},
+             trans {{ src = 'idle', tgt = 'building', events = {{ 'e_start' }} }},
+             trans {{ src = 'building', tgt = 'warming', events = {{ 'base.ok' }} }},
+             trans {{ src = 'building', tgt = 'leaving', events = {{ 'base.failed', 'base.broken', 'e_shutdown' }} }},
+             trans {{ src = 'warming', tgt = 'up', events = {{ {event} }} }},
+             trans {{ src = 'warming', tgt = 'leaving', events = {{ 'e_shutdown' }} }},
+             trans {{ src = 'up', tgt = 'leaving', events = {{ 'e_shutdown' }} }},
+             trans {{ src = 'leaving', tgt = 'idle', events = {{ 'base.undone', 'base.undo.failed', 'base.undo.broken' }} }},"
+        )
+    };
+    let said = |event: &str, keys: &str| Small::new(BASE, &life(event), keys).check();
+    let told = said("'e_wram'", "");
+    let finding = only(&told, "deploy::by_hand");
+    assert_eq!(finding["message"], "the bring-up waits in `root.warming` for `e_wram`, which nothing here raises");
+    assert_eq!(finding["severity"], "warning");
+    let reacts = "simulated: { reactions: [{ after: create a, delay_s: 0.5, raise: e_warm, component: a }] }\n";
+    for (event, keys) in [
+        ("'e_warm'", reacts),
+        ("'e_warm', 'e_other'", reacts),
+        ("'e_after(1.0)'", ""),
+        ("'e_warm'", "safety: [e_warm]\n"),
+    ] {
+        assert!(said(event, keys).of("deploy::by_hand").is_empty(), "{event} {keys}");
+    }
+}

@@ -129,3 +129,28 @@ fn what_is_in_the_way_of_another_coordinator_goes_on_the_way_down() {
         raise('e_pause') wait(0.05) raise('e_stop') wait(2) shutdown()";
     goes_down(&demo, script, &["slow.undo.failed", "`slow`, whose undo had failed before, was undone with it"]);
 }
+
+/// Something safe whose undo is asked for by its name while it is still being applied, and comes to nothing since it is asked for anew.
+#[test]
+fn what_is_safe_and_was_let_go_of_before_it_was_there_goes_on_the_way_down() {
+    let demo = conveyor();
+    demo.replace("configurations.yaml", "    group: speed\n", "");
+    demo.replace("coordinator.yaml", "held: { config: hold }", "held: { entry: hold, exit: hold.undo }");
+    demo.replace(
+        "coordinator.yaml",
+        "src: held, tgt: held, events: [e_stop]",
+        "src: held, tgt: failed, events: [hold.undo.failed, hold.undo.broken]",
+    );
+    let script = "fault('operation_call belt.brake', 'slow', 1, 0.1)
+        deploy('conveyor.yaml') wait(0.5)
+        raise('e_stop') wait(0.02) raise('e_reset') wait(0.02) raise('e_stop') wait(2) shutdown()";
+    demo.write("s.lua", script);
+    let ran = demo.run(&["run", "s.lua", "--clock", "simulated"]);
+    assert!(
+        ran.out.contains("hold.undo.failed") && ran.out.contains("`hold`, whose undo had failed before"),
+        "{}{}",
+        ran.out,
+        ran.err
+    );
+    assert_eq!((ran.code, ran.out.contains("forced")), (0, false), "{}{}", ran.out, ran.err);
+}

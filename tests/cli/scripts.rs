@@ -377,7 +377,11 @@ fn the_keys_of_a_table_come_in_an_order() {
          local ok, why = pcall(function() for _ in pairs(nil) do end end)
          say(why)
          local own = setmetatable({}, { __pairs = function() return next, { a = 1 } end })
-         for key in pairs(own) do say('own ' .. key) end",
+         for key in pairs(own) do say('own ' .. key) end
+         local hidden = setmetatable({ b = 1 }, { __metatable = {}, __pairs = function() return next, { c = 1 } end })
+         for key in pairs(hidden) do say('own ' .. key) end
+         local step, all = pairs{ x = 1, y = 2 }
+         say('next ' .. step(all, 'x') .. step(all) .. tostring(step(all, 'y')))",
         &["--quiet"],
     );
     assert!(ran.out.contains("-1.5=4 1=7 2=8 10=3 two=2 true=5 \n"), "{}{}", ran.out, ran.err);
@@ -387,7 +391,7 @@ fn the_keys_of_a_table_come_in_an_order() {
         ran.out,
         ran.err
     );
-    assert!(ran.out.contains("own a\n"), "{}{}", ran.out, ran.err);
+    assert!(ran.out.contains("own a\nown c\nnext yxnil\n"), "{}{}", ran.out, ran.err);
 }
 
 /// A misspelt name is told with its line before anything is brought up, wherever in the script it stands.

@@ -60,6 +60,7 @@ fn deployment_keys_names_and_values() {
         ("tunable: stopped", "tunable: stoped", "text::bad_value 10:69", "`stopped`"),
         ("effect: none", "effect: non", "text::bad_value 12:54", "`none`"),
         ("effect: none", "effect: nothing", "text::bad_value 12:54", "`{ undo: OPERATION }`"),
+        ("below: [self.y", "below: [age(self.y)", "text::wrong_type 12:95", "`{ age: [self.y] }`"),
         ("default: 1.0", "default: 1,0", "text::unknown_key 10:36", "with a point"),
         ("args: [float]", "args: float", "text::wrong_type 12:22", "args: [float, int]"),
         ("period_ms: 1.0", "period_ms: 1ms", "text::bad_time 14:25", "period_ms: 1"),

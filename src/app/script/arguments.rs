@@ -67,6 +67,7 @@ pub(super) fn taken<T: FromLuaMulti>(name: &str, given: MultiValue, lua: &Lua) -
             let wanted = match to.as_str() {
                 "table" | "Table" => "a table",
                 "f64" | "number" => "a number",
+                _ if from == "string" => return wrong("the text is not UTF-8".to_owned()),
                 _ => "a text",
             };
             wrong(format!("{wanted} is wanted where this has the type {from}"))

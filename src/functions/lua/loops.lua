@@ -295,7 +295,7 @@ end
 
 -- `pairs` in an order that does not change from run to run: Lua's own is by addresses and by a number that it draws when it starts, and
 -- who goes over a table by its keys must come to the same each time. Numbers first, then texts, each ascending, then what
--- has no order. What is taken out on the way is not met any more, what is put in is not met.
+-- has no order. What is taken out on the way is not met any more, what is put in may be met or not.
 local next, sort, plain_pairs = next, table.sort, pairs
 
 local function in_order(t)
@@ -319,15 +319,22 @@ end
 
 local function ordered_pairs(...)
   if select("#", ...) == 0 then error("bad argument #1 to 'pairs' (table expected, got no value)", 2) end
-  local t = ...
-  local meta = getmetatable(t)
-  -- What answers for itself, and the errors, are the library's. A metatable that does not show itself is asked as well.
-  if type(t) ~= "table" or type(meta) == "table" and rawget(meta, "__pairs") or meta ~= nil and type(meta) ~= "table" then
-    return plain_pairs(...)
-  end
+  local step, t, first = plain_pairs(...)
+  -- What answers for itself (`__pairs`) does, and what is no table is told by the loop.
+  if step ~= next or type(t) ~= "table" then return step, t, first end
   local keys, at = in_order(t), 0
-  if not keys then return next, t, nil end
-  return function()
+  if not keys then return step, t, first end
+  return function(_, last)
+    if last == nil then
+      at = 0
+    elseif keys[at] ~= last then
+      -- Somebody asks who is not where this was: as `next` does.
+      at = 1
+      while keys[at] ~= last do
+        if keys[at] == nil then error("invalid key to 'next'", 2) end
+        at = at + 1
+      end
+    end
     local key, value
     repeat
       at = at + 1

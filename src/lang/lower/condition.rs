@@ -258,7 +258,7 @@ fn signal(cx: &mut Cx, node: Node, depth: usize) -> Option<MonitoredSignal> {
     match node.kind {
         Kind::Str(ref text) => {
             if let Some((message, example, why)) = no_port(text) {
-                let help = format!("write it like `{example}`{why}");
+                let help = format!("write it like `{}`{why}", cx.spelt(node.origin, &example));
                 cx.report(Finding::error(codes::TEXT_WRONG_TYPE, message).at(origin).help(help));
                 return None;
             }
