@@ -44,7 +44,7 @@ const ONE_BY_ONE: u32 = 16;
 pub struct Index {
     touches: Vec<Touch>,
     compared: Cell<u32>,
-    tables: OnceCell<Tables>,
+    tables: OnceCell<TouchTables>,
 }
 
 impl Index {
@@ -62,7 +62,7 @@ impl Index {
             self.compared.set(compared + 1);
             return self.touches.iter().any(|own| disturb(own, touch));
         }
-        self.tables.get_or_init(|| Tables::new(&self.touches)).shares(touch)
+        self.tables.get_or_init(|| TouchTables::new(&self.touches)).shares(touch)
     }
 }
 
@@ -87,7 +87,7 @@ fn disturb(own: &Touch, other: &Touch) -> bool {
 
 /// All touches of a footprint, to be compared with very many.
 #[derive(Debug, Default)]
-struct Tables {
+struct TouchTables {
     slots: FxHashMap<Slot, Access>,
     existence: FxHashSet<ComponentName>,
     components: FxHashSet<ComponentName>,
@@ -95,7 +95,7 @@ struct Tables {
     held: FxHashSet<HeldName>,
 }
 
-impl Tables {
+impl TouchTables {
     fn new(touches: &[Touch]) -> Self {
         let mut tables = Self::default();
         // Most slots are touched once.
@@ -158,7 +158,7 @@ mod tests {
         for (at, first) in all.iter().enumerate() {
             for second in all.iter().skip(at).step_by(7) {
                 let own = [*first, *second];
-                let tables = Tables::new(&own);
+                let tables = TouchTables::new(&own);
                 for touch in &all {
                     let one_by_one = own.iter().any(|own| disturb(own, touch));
                     assert_eq!(tables.shares(touch), one_by_one, "{own:?} and {touch:?}");

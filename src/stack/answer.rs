@@ -338,7 +338,8 @@ impl fmt::Display for Reason {
                 let of = |left: bool, whose: &str| {
                     let ids = frames.iter().filter(|frame| frame.left == left);
                     let ids: Vec<String> = ids.map(|frame| format!("`{}`", frame.configuration)).collect();
-                    let told = format!("{}{whose} was undone with it, since it stood in its way", ids.join(", "));
+                    let (was, it) = if ids.len() > 1 { ("were", "they") } else { ("was", "it") };
+                    let told = format!("{}{whose} {was} undone with it, since {it} stood in its way", ids.join(", "));
                     (!ids.is_empty()).then_some(told)
                 };
                 let told = [of(false, " of an operator"), of(true, ", whose undo had failed before,")];

@@ -147,7 +147,8 @@ fn what_is_safe_and_was_let_go_of_before_it_was_there_goes_on_the_way_down() {
     demo.write("s.lua", script);
     let ran = demo.run(&["run", "s.lua", "--clock", "simulated"]);
     assert!(
-        ran.out.contains("hold.undo.failed") && ran.out.contains("`hold`, whose undo had failed before"),
+        ran.out.contains("hold.undo.failed")
+            && ran.out.contains("`hold`, `slow`, whose undo had failed before, were undone with it"),
         "{}{}",
         ran.out,
         ran.err

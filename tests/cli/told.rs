@@ -106,7 +106,6 @@ fn a_function_that_is_called_otherwise_says_how_it_is_called() {
     for (text, told) in [
         ("wait_state('soft')", "`wait_state` is called as `wait_state(\"STATE\", SECONDS)`: something is missing"),
         ("say(nil)", "`say` is called as `say(\"TEXT\")`: what is given is nil"),
-        ("say(e_go)", "what is a name of something stands in quotes: `\"e_go\"`"),
         ("log(1)", "a table is wanted where this"),
         ("say('a', 'b')", "`say` is called as `say(\"TEXT\")`: 2 values are given"),
         ("now(1)", "it takes nothing"),

@@ -19,7 +19,7 @@ fn what_an_operator_put_in_the_way_goes_with_what_the_coordinator_undoes() {
     let at = |what: &str| steps.iter().position(|step| step == what).unwrap_or_else(|| panic!("{what}: {steps:?}"));
     assert!(at("property_set b.k = 3.0") < at("property_set b.k = 1.0"), "{steps:?}");
     assert!(at("property_set b.k = 1.0") < at("destroy b"), "{steps:?}");
-    let told = "`stiff`, `soft` of an operator was undone with it, since it stood in its way";
+    let told = "`stiff`, `soft` of an operator were undone with it, since they stood in its way";
     assert_eq!(small.why("base.undone"), told);
     small.is_empty();
 }

@@ -43,7 +43,7 @@ end
 -- The nodes and transitions written in a state: numbered entries first, then named ones as they were made.
 local function parts(state)
   local list = {}
-  for key, value in pairs(state) do
+  for key, value in next, state do
     if type(key) ~= "string" or key:sub(1, 1) ~= "_" then
       local k = kind(value)
       if k then list[#list + 1] = { key = key, value = value, kind = k } end
@@ -62,7 +62,7 @@ end
 
 local function is_composite(state)
   if kind(state) ~= "state" then return false end
-  for key, value in pairs(state) do
+  for key, value in next, state do
     if type(key) == "string" and key:sub(1, 1) ~= "_" and is_node(value) then return true end
   end
   return false
@@ -368,9 +368,9 @@ function native.tables(template)
     shown[name] = rawget(template, name)
     silent[name] = false
   end
-  for name in pairs(silent) do rawset(template, name, false) end
+  for name in next, silent do rawset(template, name, false) end
   local ran, fsm, faulty = pcall(tables, template)
-  for name in pairs(silent) do rawset(template, name, shown[name]) end
+  for name in next, silent do rawset(template, name, shown[name]) end
   if not ran then return copy(template, {}, 0), fsm end
   return fsm or copy(template, {}, 0), nil
 end
