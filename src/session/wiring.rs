@@ -382,12 +382,13 @@ impl Session {
 
     /// Follows the configurator into *broken* and back.
     pub(super) fn refresh_phase(&self) {
-        // Not known: as it was.
-        let Ok(view) = self.view(false) else { return };
-        match (self.hub.phase(), view.is_some_and(|view| view.broken.is_some())) {
-            (Phase::Up, true) => self.hub.set_phase(Phase::Broken),
-            (Phase::Broken, false) => self.hub.set_phase(Phase::Up),
-            _ => {}
+        // Not known: as it was. What was looked at may be over when it is told: then it is looked once more.
+        while let Ok(view) = self.view(false) {
+            match (self.hub.phase(), view.is_some_and(|view| view.broken.is_some())) {
+                (Phase::Up, true) => self.hub.set_phase(Phase::Broken),
+                (Phase::Broken, false) => self.hub.set_phase(Phase::Up),
+                _ => return,
+            }
         }
     }
 

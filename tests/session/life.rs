@@ -177,7 +177,6 @@ fn a_script_that_fails_leaves_nothing_behind() {
         ("deploy('@generic_arm.yaml') wait_state('idel', 0.5)", "no state `idel`: did you mean `idle`?"),
         ("deploy('@generic_arm.yaml') raise('e_5dofs')", "did you mean `e_5dof`?"),
         ("deploy('@generic_arm.yaml') apply('eight_DOFF')", "did you mean `eight_DOF`?"),
-        ("deploy('@generic_arm.yaml') asert_running('x')", "did you mean `assert_running`?"),
         ("deploy('@generic_arm.yaml') wait_answer('e_never', 1)", "`e_never` was not heard in 1 s"),
         ("deploy('@generic_arm.yaml') wait_answer('eight_DOF.okk', 1)", "is never heard"),
         ("deploy('@generic_arm.yaml') wait_answer('eight_DOF.done', 1)", "`eight_DOF.ok`"),
@@ -218,6 +217,10 @@ fn a_script_that_fails_leaves_nothing_behind() {
         assert!(failure.contains(message), "{script}: {failure}");
         assert_eq!(clean, Some(true), "{script}");
     }
+    // A misspelt name is told before anything is there.
+    let (failure, ended) = run_text("deploy('@generic_arm.yaml') asert_running('x')");
+    assert!(failure.unwrap().contains("did you mean `assert_running`?"));
+    assert_eq!(ended, None);
     let (failure, ended) = run_text("shutdown()");
     assert!(failure.unwrap().contains("nothing is deployed"));
     assert_eq!(ended, None);

@@ -12,7 +12,7 @@ pub enum ScriptFailure {
     #[error("{}", .0.message)]
     Unreadable(Box<Finding>),
     /// It uses names that there are not. It was not begun.
-    #[error("it uses names that are not defined")]
+    #[error("{}", told(findings))]
     Unknown {
         /// Each with its place.
         findings: Vec<Finding>,
@@ -53,3 +53,12 @@ pub enum ScriptFailure {
 #[derive(Debug, thiserror::Error)]
 #[error("{0} is refused")]
 pub(super) struct IsRefused(pub String);
+
+/// Findings in one line, each with what to do.
+fn told(findings: &[Finding]) -> String {
+    let one = |finding: &Finding| match &finding.help {
+        Some(help) => format!("{}: {help}", finding.message),
+        None => finding.message.clone(),
+    };
+    findings.iter().map(one).collect::<Vec<_>>().join("; ")
+}
