@@ -266,21 +266,23 @@ fn a_frame_that_takes_over_a_value_tells_worlds_apart() {
     Small::new(&configurations, &together, "").check();
 }
 
-/// A state that is met first behind an undo that fails, and later without any failure.
+/// A state that is met first behind a request that fails, and later without any failure.
 #[test]
 fn a_state_is_judged_by_its_best_way() {
     let configurations = format!(
-        "{BASE} all = Configuration {{ destroy(\"a\") }}, wrong = Configuration {{ create(\"a\", \"Drive\") }},"
+        "{BASE} all = Configuration {{ destroy(\"a\") }}, wrong = Configuration {{ create(\"a\", \"Drive\") }},
+         soft = Configuration {{ property_set(\"a.gain\", 2.0) }},"
     );
-    let states = "idle = state {}, building = state { entry = \"base\" }, up = state {}, undoing = state { entry = \"base.undo\" },
+    let states =
+        "idle = state {}, building = state { entry = \"base\" }, up = state {}, trying = state { entry = \"soft\" },
         one = state {}, two = state {}, three = state {}, both = state {}, next = state { entry = \"wrong\" },
         leaving = state { entry = \"all\" },
         trans { src = \"initial\", tgt = \"idle\" },
         trans { src = \"idle\", tgt = \"building\", events = { \"e_start\" } },
         trans { src = \"building\", tgt = \"up\", events = { \"base.ok\" } },
-        trans { src = \"up\", tgt = \"undoing\", events = { \"e_undo\" } },
-        trans { src = \"undoing\", tgt = \"both\", events = { \"base.undo.failed\" } },
-        trans { src = \"undoing\", tgt = \"idle\", events = { \"base.undone\", \"e_shutdown\" } },
+        trans { src = \"up\", tgt = \"trying\", events = { \"e_try\" } },
+        trans { src = \"trying\", tgt = \"both\", events = { \"soft.failed\" } },
+        trans { src = \"trying\", tgt = \"leaving\", events = { \"soft.ok\", \"soft.broken\", \"e_shutdown\" } },
         trans { src = \"up\", tgt = \"one\", events = { \"e_one\" } },
         trans { src = \"one\", tgt = \"two\", events = { \"e_two\" } },
         trans { src = \"two\", tgt = \"three\", events = { \"e_three\" } },
