@@ -3,10 +3,8 @@
 
 #![allow(missing_docs, clippy::disallowed_methods)]
 
-use davit::model::monitor::{
-    Comparison, Condition, ConditionKind, Interval, Monitor, MonitoredSignal, Sampling, SignalKind,
-};
-use davit::model::{EventName, Ident, Origin};
+use davit::model::monitor::{Comparison, Condition, ConditionKind, Interval, Monitor, MonitoredSignal, SignalKind};
+use davit::model::{EventName, Ident};
 use davit::monitor::{Bank, InputSample};
 use davit::time::Time;
 use std::hint::black_box;
@@ -20,15 +18,8 @@ const MEASURED: u64 = 1_000_000;
 
 fn monitor(kind: ConditionKind) -> Monitor {
     Monitor {
-        name: Ident::new("m").expect("a name"),
-        when: Condition::new(kind),
         raise: Some(EventName::new("e").expect("a name")),
-        cleared: None,
-        repeat: None,
-        sampling: Sampling::OnSample,
-        enabled: true,
-        description: None,
-        origin: Origin::NONE,
+        ..Monitor::new(Ident::new("m").expect("a name"), Condition::new(kind))
     }
 }
 

@@ -140,25 +140,38 @@ impl Compared<'_> {
     }
 
     fn whole(&mut self, declared: &ComponentType, library: &ComponentType) {
+        // Each field is decided about here, members each by itself: of one more the compiler asks what is to be.
+        let ComponentType { start_after, stop_before, raises, actuator, moves, irreversible, exclusive, .. } = declared;
+        let ComponentType {
+            name: _,
+            doc: _,
+            ports: _,
+            properties: _,
+            operations: _,
+            injections: _,
+            origin: _,
+            start_after: other_start_after,
+            stop_before: other_stop_before,
+            raises: other_raises,
+            actuator: other_actuator,
+            moves: other_moves,
+            irreversible: other_irreversible,
+            exclusive: other_exclusive,
+        } = library;
         let mut found = Departures::default();
         let names = |list: &Vec<TypeName>| words(list.iter());
-        found.add("start_after", (&declared.start_after, &library.start_after), false, names);
-        found.add("stop_before", (&declared.stop_before, &library.stop_before), false, names);
+        found.add("start_after", (start_after, other_start_after), false, names);
+        found.add("stop_before", (stop_before, other_stop_before), false, names);
         // What the library does not raise is waited for in vain; what is not declared is missed by nobody.
-        if declared.raises.keys().any(|event| !library.raises.contains_key(event)) {
-            found.add("raises", (&declared.raises, &library.raises), false, |all| words(all.keys()));
+        if raises.keys().any(|event| !other_raises.contains_key(event)) {
+            found.add("raises", (raises, other_raises), false, |all| words(all.keys()));
         }
-        found.add("actuator", (&declared.actuator, &library.actuator), false, bool::to_string);
-        found.add("moves", (&declared.moves, &library.moves), false, |moves| {
-            words([("start", moves.start), ("stop", moves.stop)].iter().filter(|(_, is)| *is).map(|(word, _)| *word))
-        });
-        found.add("irreversible", (&declared.irreversible, &library.irreversible), false, |lost| {
-            let all = [("configure", lost.configure), ("stop", lost.stop), ("destroy", lost.destroy)];
-            words(all.iter().filter(|(_, is)| *is).map(|(word, _)| *word))
-        });
+        found.add("actuator", (actuator, other_actuator), false, bool::to_string);
+        found.add("moves", (moves, other_moves), false, |of| words(of.words()));
+        found.add("irreversible", (irreversible, other_irreversible), false, |of| words(of.words()));
         // What the library holds and the declaration does not say, a plan would not heed.
-        let fails = library.exclusive.iter().any(|resource| !declared.exclusive.contains(resource));
-        found.add("exclusive", (&declared.exclusive, &library.exclusive), fails, |all: &Vec<_>| words(all.iter()));
+        let fails = other_exclusive.iter().any(|resource| !exclusive.contains(resource));
+        found.add("exclusive", (exclusive, other_exclusive), fails, |all: &Vec<_>| words(all.iter()));
         for Departure { what, declared, library, fails } in found.0 {
             let message =
                 format!("`{}`: {what} is declared as {declared}, the {} has {library}", self.ty, self.by.word());
@@ -181,54 +194,56 @@ impl Compared<'_> {
 }
 
 fn port(declared: &PortType, library: &PortType) -> Departures {
+    let PortType { direction, ty, unit: own_unit, buffered, required, doc: _, origin: _ } = declared;
     let mut found = Departures::default();
-    found.add("the direction", (&declared.direction, &library.direction), true, |of| of.word().to_owned());
-    found.add("the type", (&declared.ty, &library.ty), true, ValueType::to_string);
+    found.add("the direction", (direction, &library.direction), true, |of| of.word().to_owned());
+    found.add("the type", (ty, &library.ty), true, ValueType::to_string);
     // One without a unit may be connected to any.
-    found.add("the unit", (&declared.unit, &library.unit), library.unit.is_some(), unit);
-    found.add("buffered", (&declared.buffered, &library.buffered), true, bool::to_string);
-    found.add("required", (&declared.required, &library.required), false, bool::to_string);
+    found.add("the unit", (own_unit, &library.unit), library.unit.is_some(), unit);
+    found.add("buffered", (buffered, &library.buffered), true, bool::to_string);
+    found.add("required", (required, &library.required), false, bool::to_string);
     found
 }
 
 fn property(declared: &PropertyType, library: &PropertyType) -> Departures {
+    let PropertyType { ty, default, min, max, tunable, unit: own_unit, doc: _, origin: _ } = declared;
     let mut found = Departures::default();
-    found.add("the type", (&declared.ty, &library.ty), true, ValueType::to_string);
-    found.add("the unit", (&declared.unit, &library.unit), false, unit);
-    found.add("the default", (&declared.default, &library.default), library.default.is_none(), shown);
+    found.add("the type", (ty, &library.ty), true, ValueType::to_string);
+    found.add("the unit", (own_unit, &library.unit), false, unit);
+    found.add("the default", (default, &library.default), library.default.is_none(), shown);
     let narrower = |declared: Option<f64>, library: Option<f64>, is: fn(f64, f64) -> bool| {
         library.is_some_and(|library| declared.is_none_or(|declared| is(library, declared)))
     };
     let bounds = [
-        ("min", declared.min, library.min, narrower(declared.min, library.min, |library, declared| library > declared)),
-        ("max", declared.max, library.max, narrower(declared.max, library.max, |library, declared| library < declared)),
+        ("min", *min, library.min, narrower(*min, library.min, |library, declared| library > declared)),
+        ("max", *max, library.max, narrower(*max, library.max, |library, declared| library < declared)),
     ];
     for (what, own, other, fails) in bounds {
         found.add(what, (&own, &other), fails, shown);
     }
     // In the order of the run states in which it may be set.
-    let tunable = |of: &Tunable| format!("{of:?}").to_lowercase();
-    found.add("tunable", (&declared.tunable, &library.tunable), library.tunable < declared.tunable, tunable);
+    found.add("tunable", (tunable, &library.tunable), library.tunable < *tunable, Tunable::to_string);
     found
 }
 
 fn operation(declared: &OperationType, library: &OperationType) -> Departures {
+    let OperationType { args: own_args, returns, effect, moves, settled_by, doc: _, origin: _ } = declared;
     let mut found = Departures::default();
     let args =
         |of: &Vec<ValueType>| format!("[{}]", of.iter().map(ValueType::to_string).collect::<Vec<_>>().join(", "));
-    found.add("args", (&declared.args, &library.args), true, args);
-    found.add("returns", (&declared.returns, &library.returns), false, shown);
-    found.add("the effect", (&declared.effect, &library.effect), false, |effect| match effect {
+    found.add("args", (own_args, &library.args), true, args);
+    found.add("returns", (returns, &library.returns), false, shown);
+    found.add("the effect", (effect, &library.effect), false, |effect| match effect {
         Effect::None => "none".to_owned(),
         Effect::Undo(undo) => format!("undo: {undo}"),
         Effect::Irreversible => "irreversible".to_owned(),
     });
-    found.add("moves", (&declared.moves, &library.moves), false, bool::to_string);
-    if declared.settled_by != library.settled_by {
+    found.add("moves", (moves, &library.moves), false, bool::to_string);
+    if *settled_by != library.settled_by {
         let told = |is: bool| if is { "one condition" } else { "none" }.to_owned();
-        let other = if library.settled_by.is_some() && declared.settled_by.is_some() { "another one" } else { "" };
+        let other = if library.settled_by.is_some() && settled_by.is_some() { "another one" } else { "" };
         let library = if other.is_empty() { told(library.settled_by.is_some()) } else { other.to_owned() };
-        let declared = told(declared.settled_by.is_some());
+        let declared = told(settled_by.is_some());
         found.0.push(Departure { what: "settled_by", declared, library, fails: false });
     }
     found

@@ -122,20 +122,8 @@ fn one(out: &Output, ty: &ComponentType) {
     if ty.actuator {
         facts.push("moves something (actuator)".to_owned());
     }
-    for (flag, what) in [(ty.moves.start, "starting"), (ty.moves.stop, "stopping")] {
-        if flag {
-            facts.push(format!("{what} moves hardware: no automatic rollback does it unasked"));
-        }
-    }
-    for (flag, what) in [
-        (ty.irreversible.configure, "configuring"),
-        (ty.irreversible.stop, "stopping"),
-        (ty.irreversible.destroy, "destroying"),
-    ] {
-        if flag {
-            facts.push(format!("{what} cannot be undone"));
-        }
-    }
+    let does = ty.moves.words().map(|word| format!("`{word}` moves hardware: no automatic rollback does it unasked"));
+    facts.extend(does.chain(ty.irreversible.words().map(|word| format!("`{word}` cannot be undone"))));
     for (word, types) in [("starts after", &ty.start_after), ("stops before", &ty.stop_before)] {
         if !types.is_empty() {
             facts.push(format!("{word} {}", types.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")));

@@ -183,8 +183,8 @@ fn watches(monitor: &Monitor) -> BTreeSet<WatchedMember> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::monitor::Condition;
     use crate::model::monitor::MONITORS_TYPE;
-    use crate::model::monitor::{Condition, Sampling};
     use crate::model::{ComponentSnapshot, ComponentType, EventName, Ident, PortType, ValueType};
 
     /// A diagram of the youBot's control loop, with everything a drawing can have.
@@ -271,15 +271,8 @@ mod tests {
             Condition::new(ConditionKind::Silent { port: port(text), time: std::time::Duration::from_millis(100) })
         };
         let monitor = |own: &str, when: Condition, raise: Option<&str>| Monitor {
-            name: name(own),
-            when,
             raise: raise.map(|event| EventName::new(event).unwrap()),
-            cleared: None,
-            repeat: None,
-            sampling: Sampling::OnSample,
-            enabled: true,
-            description: None,
-            origin: crate::model::Origin::NONE,
+            ..Monitor::new(name(own), when)
         };
         let faulted = Condition::new(ConditionKind::Faulted(ComponentName::new("Base_Ctrl").unwrap()));
         let monitors = [

@@ -5,6 +5,7 @@
 //! exist. Whether a component has that port is the business of later rooms, which find the place through the
 //! [`SourceMap`].
 
+mod bound;
 mod compose;
 mod concern;
 mod convert;

@@ -242,6 +242,11 @@ impl Fields {
         self.entries.iter().flatten().find(|entry| entry.key == key).map(|entry| entry.origin)
     }
 
+    /// Where what stands behind a field's name stands, where it was not taken.
+    pub fn value_place(&self, key: &str) -> Option<Origin> {
+        self.entries.iter().flatten().find(|entry| entry.key == key).map(|entry| entry.value.origin)
+    }
+
     /// Whether a field is there, and not taken.
     pub fn has(&self, key: &str) -> bool {
         self.entries.iter().flatten().any(|entry| entry.key == key)

@@ -12,7 +12,7 @@ use super::trusted::Trust;
 use super::yaml;
 use crate::diagnostics::Language;
 use crate::limits;
-use crate::model::{Deployment, Finding, Origin, PlatformKind, Subsystem, codes};
+use crate::model::{Deployment, Finding, Origin, Subsystem, codes};
 use rustc_hash::FxHashMap;
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
@@ -92,7 +92,7 @@ impl DeploymentReader<'_> {
             let first = path.split_once('.').map(|(first, _)| first);
             subsystems.iter().any(|subsystem| first == Some(subsystem.name.as_str()))
         };
-        let declared = &draft.interface.parameters;
+        let declared = &draft.deployment.interface.parameters;
         let (mut given, mut others) = (part.given, Vec::new());
         for (path, text) in set.iter().filter(|(path, _)| !inner(path)) {
             let Some((_, parameter)) = declared.iter().find(|(name, _)| name.as_str() == path) else {
@@ -145,8 +145,7 @@ impl DeploymentReader<'_> {
             if let Some((chart, program)) =
                 coordinator(cx, from, &folder.join(file), *named_at, &mut params, trust.as_ref())
             {
-                let own = name.or(draft.name);
-                programs.extend(own.zip(program));
+                programs.extend(program.map(|program| (name.unwrap_or(draft.deployment.name), program)));
                 charts.push((*name, chart, *named_at));
             }
         }
@@ -172,33 +171,13 @@ impl DeploymentReader<'_> {
         if charts.len() < draft.coordinators.len() || charts.is_empty() {
             return None;
         }
-        let (coordinators, deploy, shutdown) = beside::join(cx, draft.name?, charts, &draft.deploy?, &draft.shutdown?);
-        let own = Deployment {
-            name: draft.name?,
-            platform: draft.platform?,
-            kind: PlatformKind::of(draft.platform?),
-            platform_options: draft.platform_options,
-            libraries: draft.libraries,
-            types: draft.types,
-            activities: draft.activities,
-            configurations,
-            coordinators,
-            programs,
-            monitors,
-            emits: draft.emits,
-            safety: draft.safety,
-            operator: draft.operator,
-            deploy,
-            shutdown,
-            limits: draft.limits,
-            reactions: draft.reactions,
-            faults: draft.faults,
-            interface: draft.interface,
-            subsystems,
-            own: None,
-            origin,
-            key_origins: draft.key_origins,
-        };
+        if !draft.is_whole {
+            return None;
+        }
+        let mut own = draft.deployment;
+        own.coordinators = beside::join(cx, own.name, charts, &draft.deploy?, &draft.shutdown?);
+        (own.configurations, own.programs, own.monitors) = (configurations, programs, monitors);
+        (own.subsystems, own.origin) = (subsystems, origin);
         Some(compose::compose(cx, own))
     }
 

@@ -7,7 +7,7 @@ use super::names::{ComponentName, EventName, Ident, TypeName};
 use super::resource::Resource;
 use super::run_state::RunState;
 use super::value::{FitError, Value, ValueType};
-use super::words::words;
+use super::words::{marks, words};
 use rustc_hash::FxHashMap;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -50,25 +50,29 @@ pub struct ComponentType {
     pub origin: Origin,
 }
 
-/// Which changes of a component's run state move hardware.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
-pub struct Moves {
-    /// Starting.
-    pub start: bool,
-    /// Stopping.
-    pub stop: bool,
+marks! {
+    /// Which changes of a component's run state move hardware.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+    pub struct Moves {
+        /// Starting.
+        pub start: bool,
+        /// Stopping.
+        pub stop: bool,
+    }
 }
 
-/// Which moves of a component cannot be undone.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
-#[allow(clippy::struct_excessive_bools)]
-pub struct Irreversible {
-    /// Configuring (as for a device that is calibrated by it).
-    pub configure: bool,
-    /// Stopping.
-    pub stop: bool,
-    /// Destroying.
-    pub destroy: bool,
+marks! {
+    /// Which moves of a component cannot be undone.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+    #[allow(clippy::struct_excessive_bools)]
+    pub struct Irreversible {
+        /// Configuring (as for a device that is calibrated by it).
+        pub configure: bool,
+        /// Stopping.
+        pub stop: bool,
+        /// Destroying.
+        pub destroy: bool,
+    }
 }
 
 words! {

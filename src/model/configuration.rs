@@ -82,6 +82,11 @@ pub enum OnFailure {
     Hold,
 }
 
+impl OnFailure {
+    /// What can be written, by its word.
+    pub const WORDS: &'static [(&'static str, Self)] = &[("rollback", Self::Rollback), ("hold", Self::Hold)];
+}
+
 /// An event that must come within a time, else the frame is popped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Confirm {

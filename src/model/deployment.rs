@@ -196,7 +196,7 @@ impl fmt::Display for OperatorMay {
 }
 
 /// A thread of the embedded runtime that updates components.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Activity {
     /// Its period; none: event-driven, updated when a sample or an event arrives.
     pub period: Option<Duration>,
@@ -245,6 +245,36 @@ impl Default for DeploymentLimits {
 }
 
 impl Deployment {
+    /// One of which nothing else is said.
+    pub fn new(name: Ident, platform: Ident, deploy: BringUp, shutdown: TakeDown) -> Self {
+        Self {
+            name,
+            platform,
+            kind: PlatformKind::of(platform),
+            platform_options: BTreeMap::new(),
+            libraries: Vec::new(),
+            types: Vec::new(),
+            activities: BTreeMap::new(),
+            configurations: Vec::new(),
+            coordinators: Vec::new(),
+            programs: BTreeMap::new(),
+            monitors: Vec::new(),
+            emits: Vec::new(),
+            safety: Vec::new(),
+            operator: Vec::new(),
+            deploy,
+            shutdown,
+            limits: DeploymentLimits::default(),
+            reactions: Vec::new(),
+            faults: Vec::new(),
+            interface: Interface::default(),
+            subsystems: Vec::new(),
+            own: None,
+            origin: Origin::NONE,
+            key_origins: BTreeMap::new(),
+        }
+    }
+
     /// Whether an event from outside is heard also while the deployment is being stopped: those of safety, and the one that
     /// shuts down. Where nobody has said which are those of safety, it may be any but the one that begins the deployment. Events
     /// of components and monitors always are: nobody asks them to be silent.

@@ -313,6 +313,21 @@ pub fn is_monitors(ty: TypeName) -> bool {
 }
 
 impl Monitor {
+    /// One that watches from the beginning, on each sample, and raises nothing.
+    pub fn new(name: Ident, when: Condition) -> Self {
+        Self {
+            name,
+            when,
+            raise: None,
+            cleared: None,
+            repeat: None,
+            sampling: Sampling::OnSample,
+            enabled: true,
+            description: None,
+            origin: Origin::NONE,
+        }
+    }
+
     /// The type of the component that runs it: the monitors of a subsystem are a type of their own.
     ///
     /// # Panics

@@ -43,4 +43,29 @@ macro_rules! words {
     };
 }
 
-pub(crate) use {sent_as_shown, words};
+/// A set of marks of which each is one word wherever it is written or shown: the name of its field.
+macro_rules! marks {
+    ($(#[$about:meta])* pub struct $name:ident { $($(#[$of:meta])* pub $mark:ident: bool,)* }) => {
+        $(#[$about])*
+        pub struct $name {
+            $($(#[$of])* pub $mark: bool,)*
+        }
+
+        impl $name {
+            /// All words.
+            pub const WORDS: &'static [&'static str] = &[$(stringify!($mark)),*];
+
+            /// Those that are set.
+            pub fn words(self) -> impl Iterator<Item = &'static str> {
+                [$((stringify!($mark), self.$mark)),*].into_iter().filter(|(_, is)| *is).map(|(word, _)| word)
+            }
+
+            /// Sets that of a word.
+            pub fn mark(&mut self, word: &str) {
+                $(self.$mark |= word == stringify!($mark);)*
+            }
+        }
+    };
+}
+
+pub(crate) use {marks, sent_as_shown, words};

@@ -3,8 +3,8 @@
 use super::compile::{PIECES, compile};
 use super::sample::{InputNews, InputSample, MonitorInput};
 use super::watched::WatchedMonitor;
-use crate::model::monitor::{Condition, Monitor, Sampling};
-use crate::model::{EventName, Ident, Origin};
+use crate::model::monitor::{Condition, Monitor};
+use crate::model::{EventName, Ident};
 use crate::time::Time;
 
 /// What was not as it should be, counted since the beginning.
@@ -43,17 +43,8 @@ impl Bank {
     /// # Panics
     /// Never: its name is a plain one.
     pub fn alone(condition: &Condition, now: Time) -> Self {
-        let monitor = Monitor {
-            name: Ident::new("holds").expect("a plain name"),
-            when: condition.clone(),
-            raise: None,
-            cleared: None,
-            repeat: None,
-            sampling: Sampling::OnSample,
-            enabled: false,
-            description: None,
-            origin: Origin::NONE,
-        };
+        let name = Ident::new("holds").expect("a plain name");
+        let monitor = Monitor { enabled: false, ..Monitor::new(name, condition.clone()) };
         let mut bank = Self::new(&[monitor]);
         bank.enable(0, true, now);
         bank

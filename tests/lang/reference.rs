@@ -189,6 +189,41 @@ fn every_example_is_read_and_every_refused_line_is_refused_so() {
     }
 }
 
+/// Keys that are read into something else than themselves, and so are not written again.
+const NOT_WRITTEN_AGAIN: &[(&str, &str)] = &[
+    // Values that the texts have where they were used.
+    ("deployment", "with"),
+    ("deployment", "parameters"),
+    // Of what is composed, the whole is written.
+    ("deployment", "subsystems"),
+    // Of coordinators with functions, which stay the files that they are; those of these examples have none.
+    ("deployment", "trusted"),
+    ("deployment", "host"),
+    ("trusted", "open"),
+];
+
+#[test]
+fn what_is_read_is_written_again() {
+    let mut written = 0;
+    for (file, object, key, read, _) in rows().into_iter().filter(|(_, _, key, ..)| key.language != Languages::None) {
+        let of_composing = ["subsystem", "parameter"].contains(&object.name);
+        if of_composing || NOT_WRITTEN_AGAIN.contains(&(object.name, key.name)) {
+            continue;
+        }
+        let text = serde_yaml::to_string(&read).unwrap();
+        let deployment = load(file, &text, "x.yaml").deployment.unwrap();
+        let files = lang::print::deployment(&deployment, davit::diagnostics::Language::Yaml);
+        let all: String = files.into_iter().map(|(_, text)| text).collect();
+        let is_there = all.match_indices(key.name).any(|(at, name)| {
+            let before = all[..at].chars().next_back();
+            before.is_none_or(|c| " {\n".contains(c)) && all[at + name.len()..].starts_with(':')
+        });
+        assert!(is_there, "{}.{} is read, and not written:\n{text}\n{all}", object.name, key.name);
+        written += 1;
+    }
+    assert!(written > 90, "{written}");
+}
+
 #[test]
 fn every_example_in_lua_is_read() {
     let mut read = 0;

@@ -11,7 +11,7 @@ use davit::model::*;
 use proptest::collection::{btree_map, btree_set, vec};
 use proptest::option;
 use proptest::prelude::*;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::time::Duration;
 
@@ -469,11 +469,9 @@ fn deployment() -> impl Strategy<Value = Deployment> {
                 (reactions, faults, (safety, operator), platform_options),
             ),
         )| Deployment {
-            name: names[0],
-            platform: names[1],
-            kind: PlatformKind::of(names[1]),
             platform_options,
-            libraries: names[2..].to_vec(),
+            // Each once.
+            libraries: names[2..].iter().copied().collect::<BTreeSet<_>>().into_iter().collect(),
             types,
             activities,
             configurations,
@@ -497,21 +495,14 @@ fn deployment() -> impl Strategy<Value = Deployment> {
                 };
                 coordinators.into_iter().enumerate().filter_map(made).collect()
             },
-            programs: BTreeMap::new(),
             monitors,
             emits: placed(emits),
             safety,
             operator,
-            deploy,
-            shutdown,
             limits,
             reactions,
             faults,
-            interface: Interface::default(),
-            subsystems: Vec::new(),
-            own: None,
-            origin: Origin::NONE,
-            key_origins: BTreeMap::new(),
+            ..Deployment::new(names[0], names[1], deploy, shutdown)
         },
     )
 }

@@ -30,15 +30,9 @@ pub fn above(text: &str, v: f64) -> Condition {
 
 pub fn monitor(when: Condition) -> Monitor {
     Monitor {
-        name: Ident::new("m").unwrap(),
-        when,
         raise: Some(EventName::new("e_on").unwrap()),
         cleared: Some(EventName::new("e_off").unwrap()),
-        repeat: None,
-        sampling: Sampling::OnSample,
-        enabled: true,
-        description: None,
-        origin: Origin::NONE,
+        ..Monitor::new(Ident::new("m").unwrap(), when)
     }
 }
 

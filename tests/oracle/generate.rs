@@ -479,31 +479,14 @@ pub fn make(chance: &mut Chance) -> Made {
         coordinators.push(coordinator(chance, "two", 1, count, several, kept, &mut text));
     }
     let _ = writeln!(text, "limits.stack {stack}");
+    let deploy = BringUp { event: event("e_start"), within: Duration::from_secs(5) };
+    let shutdown = TakeDown { event: event("e_shutdown"), within: Duration::from_secs(5), rest: Vec::new() };
     let deployment = Deployment {
-        name: ident("oracle"),
-        platform: ident("simulated"),
-        kind: davit::model::PlatformKind::SIMULATED,
-        platform_options: BTreeMap::new(),
-        libraries: Vec::new(),
-        types: Vec::new(),
-        activities: BTreeMap::new(),
         configurations,
         coordinators,
-        programs: BTreeMap::new(),
-        monitors: Vec::new(),
         emits: TOLD.iter().map(|name| (event(name), Origin::NONE)).collect(),
-        safety: Vec::new(),
-        operator: Vec::new(),
-        deploy: BringUp { event: event("e_start"), within: Duration::from_secs(5) },
-        shutdown: TakeDown { event: event("e_shutdown"), within: Duration::from_secs(5), rest: Vec::new() },
         limits: DeploymentLimits { stack, step_timeout: Duration::from_millis(20) },
-        reactions: Vec::new(),
-        faults: Vec::new(),
-        interface: Interface::default(),
-        subsystems: Vec::new(),
-        own: None,
-        origin: Origin::NONE,
-        key_origins: BTreeMap::new(),
+        ..Deployment::new(ident("oracle"), ident("simulated"), deploy, shutdown)
     };
     Made { deployment, catalogue: catalogue(), text, kept }
 }

@@ -54,15 +54,10 @@ fn above(text: &str, limit: f64) -> Condition {
 
 fn monitor(name: &str, when: Condition, enabled: bool) -> Monitor {
     Monitor {
-        name: ident(name),
-        when,
         raise: Some(EventName::new(&format!("e_{name}")).unwrap()),
         cleared: Some(EventName::new(&format!("e_no_{name}")).unwrap()),
-        repeat: None,
-        sampling: Sampling::OnSample,
         enabled,
-        description: None,
-        origin: Origin::NONE,
+        ..Monitor::new(ident(name), when)
     }
 }
 

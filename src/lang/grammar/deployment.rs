@@ -200,7 +200,7 @@ pub static DEPLOYMENT: Object = Object {
             "limits",
             Form::Table(&LIMITS),
             "Bounds of this deployment.",
-            "limits: { stack: 64, step_timeout_s: 1.0 }",
+            "limits: { stack: 32, step_timeout_s: 0.5 }",
             ("limits: 64", TEXT_WRONG_TYPE),
         ).without("those of its keys"),
         key("durability", Form::Text, "", "", ("durability: full", DEPLOY_NO_JOURNAL)).only(Languages::None),
@@ -365,14 +365,14 @@ pub static LIMITS: Object = Object {
     name: "limits",
     what: "`limits`",
     doc: "Bounds of one deployment.",
-    example: "limits: { stack: 64, step_timeout_s: 1.0 }",
+    example: "limits: { stack: 32, step_timeout_s: 0.5 }",
     keys: &[
         key(
             "stack",
             Form::Whole { least: FEWEST_FRAMES, most: MOST_FRAMES },
             "How many frames there may be of each coordinator, and of operators in each subsystem, before the oldest of them are squashed into one; that of \
              the deployment that runs counts for all its subsystems.",
-            "stack: 64",
+            "stack: 32",
             ("stack: 1", TEXT_BAD_VALUE),
         )
         .without("64"),
@@ -381,7 +381,7 @@ pub static LIMITS: Object = Object {
             Form::Seconds,
             "How long one step may take before its outcome is unknown, and how long a call that was given up may take to come \
              to rest.",
-            "step_timeout_s: 1.0",
+            "step_timeout_s: 0.5",
             ("step_timeout_s: -1", TEXT_BAD_TIME),
         )
         .without("1 s"),

@@ -8,10 +8,8 @@ use crate::lang::grammar::{DEPLOY, SHUTDOWN};
 use crate::lang::tree::{Cx, Fields, Kind, Node};
 use crate::model::finding::did_you_mean;
 use crate::model::{
-    BringUp, ConfigId, Coordinator, CoordinatorNaming, EventName, Finding, Ident, OPERATOR, Origin, Statechart,
-    TakeDown, codes,
+    BringUp, ConfigId, Coordinator, CoordinatorNaming, Finding, Ident, OPERATOR, Origin, Statechart, TakeDown, codes,
 };
-use std::time::Duration;
 
 /// A state as a deployment names it.
 #[derive(Debug, Clone)]
@@ -23,22 +21,21 @@ pub struct Named {
 
 /// `deploy`, before it is known which coordinators there are.
 pub struct Rise {
-    event: EventName,
+    /// What is said of all of them.
+    pub deploy: BringUp,
     up: Vec<Named>,
     /// Where `up` is written.
     up_at: Origin,
     failed: Vec<Named>,
-    within: Duration,
 }
 
 /// `shutdown`, likewise.
 pub struct Fall {
-    event: EventName,
+    /// What is said of all of them.
+    pub shutdown: TakeDown,
     down: Vec<Named>,
     /// Where `down` is written.
     down_at: Origin,
-    within: Duration,
-    rest: Vec<(ConfigId, Origin)>,
 }
 
 /// `coordinator` and `coordinators`.
@@ -106,7 +103,7 @@ pub fn rise(cx: &mut Cx, node: Node) -> Option<Rise> {
     let failed = states(cx, &mut fields, "failed");
     let within = fields.time(cx, "within_s");
     fields.finish(cx);
-    Some(Rise { event: event?, up, up_at, failed, within: within? })
+    Some(Rise { deploy: BringUp { event: event?, within: within? }, up, up_at, failed })
 }
 
 /// `shutdown`
@@ -116,9 +113,9 @@ pub fn fall(cx: &mut Cx, node: Node) -> Option<Fall> {
     let down_at = fields.place("down").unwrap_or(fields.origin);
     let down = states(cx, &mut fields, "down");
     let within = fields.time(cx, "within_s");
-    let rest = names(cx, &mut fields, "rest", "`shutdown.rest`");
+    let rest: Vec<(ConfigId, Origin)> = names(cx, &mut fields, "rest", "`shutdown.rest`");
     fields.finish(cx);
-    Some(Fall { event: event?, down, down_at, within: within?, rest })
+    Some(Fall { shutdown: TakeDown { event: event?, within: within?, rest }, down, down_at })
 }
 
 /// Gives each coordinator its states. `own` is the name of the deployment, and of a coordinator without one.
@@ -128,7 +125,7 @@ pub fn join(
     charts: Vec<(Option<Ident>, Statechart, Origin)>,
     rise: &Rise,
     fall: &Fall,
-) -> (Vec<Coordinator>, BringUp, TakeDown) {
+) -> Vec<Coordinator> {
     let names: Vec<Ident> = charts.iter().map(|(name, ..)| name.unwrap_or(own)).collect();
     if let Some(again) = (1..names.len()).find(|at| names[..*at].contains(&names[*at])) {
         let message = format!("there are two coordinators `{}`", names[again]);
@@ -170,9 +167,7 @@ pub fn join(
         let written = if named.is_some() { CoordinatorNaming::Named } else { CoordinatorNaming::Alone };
         Coordinator { name, written, chart, up, failed: failed(name), down, of: None, origin }
     });
-    let deploy = BringUp { event: rise.event, within: rise.within };
-    let shutdown = TakeDown { event: fall.event, within: fall.within, rest: fall.rest.clone() };
-    (coordinators.collect(), deploy, shutdown)
+    coordinators.collect()
 }
 
 /// The one state that means `what` of one coordinator.

@@ -13,12 +13,13 @@
 //!     - { src: idle, tgt: copying, events: [e_aligned], effect: e_seen, pn: 1 }
 //! ```
 
-use super::{name, own_name, text, truth};
+use super::{own_name, truth};
+use crate::lang::bound::{self, function};
 use crate::lang::grammar::{CONNECTOR, STATE, TRANSITION};
 use crate::lang::tree::{Cx, Entry, Fields, Kind, Node};
 use crate::limits;
-use crate::model::statechart::{self, Action, ChartTransition, Connector, ROOT, State, Statechart, Trigger};
-use crate::model::{ConfigId, EventName, Finding, Ident, Origin, codes};
+use crate::model::statechart::{self, ChartTransition, Connector, ROOT, State, Statechart};
+use crate::model::{Finding, Ident, Origin, codes};
 
 /// Names that mean something else in a state's table, in the one language or the other.
 const RESERVED: &[&str] = &["entry", "exit", "doo", "config", "doc", "type", "new", "rfsm"];
@@ -57,17 +58,10 @@ fn state(cx: &mut Cx, name: Ident, node: Node, depth: usize) -> Option<State> {
         out.children.extend(child(cx, entry, depth));
     }
     out.transitions = transitions.into_iter().filter_map(|node| transition(cx, node)).collect();
-    out.entry = actions(cx, &mut fields, "entry");
-    out.exit = actions(cx, &mut fields, "exit");
-    for node in fields.several(cx, "config") {
-        let id = self::name::<ConfigId>(cx, &node, "`config`", fields.row("config").example);
-        let place = cx.place(&node);
-        out.config.extend(id.map(|id| (id, place)));
-    }
+    bound::STATE.read(&mut out, &mut fields, cx);
     if let Some(node) = fields.take(cx, "doo") {
         function(cx, &node, "`doo`");
     }
-    out.doc = fields.text(cx, "doc");
     fields.finish(cx);
     Some(out)
 }
@@ -143,9 +137,10 @@ fn child(cx: &mut Cx, entry: Entry, depth: usize) -> Option<statechart::ChartNod
             let finding = Finding::error(codes::TEXT_BAD_VALUE, "`connector` can only be true").at(node.origin);
             cx.report(finding.help("a state is written without this key"));
         }
-        let doc = fields.text(cx, "doc");
+        let mut connector = Connector { name: ident.or_else(|| Ident::new("unnamed").ok())?, doc: None, origin };
+        bound::CONNECTOR.read(&mut connector, &mut fields, cx);
         fields.finish(cx);
-        ident.map(|name| statechart::ChartNode::Connector(Connector { name, doc, origin }))
+        ident.map(|_| statechart::ChartNode::Connector(connector))
     } else {
         // Without a name its inside is still looked at, so that all findings come at once.
         let stand_in = ident.or_else(|| Ident::new("unnamed").ok())?;
@@ -168,79 +163,10 @@ fn transition(cx: &mut Cx, node: Node) -> Option<ChartTransition> {
         _ => Fields::of(cx, node, &TRANSITION)?,
     };
     let mut out = ChartTransition { origin, ..ChartTransition::default() };
-    out.src = reference(cx, &mut fields, "src");
-    out.tgt = reference(cx, &mut fields, "tgt");
-    for node in fields.several(cx, "events") {
-        let (place, example) = (cx.place(&node), fields.row("events").example);
-        match &node.kind {
-            Kind::Str(text) => match Trigger::parse(text) {
-                Ok(trigger) => out.events.push((trigger, place)),
-                Err(error) => super::bad_name(cx, &node, &error, timed(text).as_deref().unwrap_or(example)),
-            },
-            Kind::Function => function(cx, &node, "a predicate in `events`"),
-            _ => cx.wrong(&node, "an event", "a name (a text)", example),
-        }
-    }
+    bound::TRANSITION.read(&mut out, &mut fields, cx);
     if let Some(node) = fields.take(cx, "guard") {
         function(cx, &node, "`guard`");
     }
-    out.effect = actions(cx, &mut fields, "effect");
-    out.pn = fields.number(cx, "pn").unwrap_or_default();
-    out.doc = fields.text(cx, "doc");
     fields.finish(cx);
     Some(out)
-}
-
-/// How a time event is written that is written otherwise: with a unit, or without its brackets.
-fn timed(text: &str) -> Option<String> {
-    let word = ["e_after", "e_at"].into_iter().find(|word| text.starts_with(word))?;
-    let rest = text[word.len()..].trim_matches(|c: char| c.is_whitespace() || "()=:".contains(c));
-    Some(format!("events = {{ \"{word}({})\" }}", super::parse_time(rest)?))
-}
-
-fn reference(cx: &mut Cx, fields: &mut Fields, key: &'static str) -> Option<(String, Origin)> {
-    // That it is missing is told where the chart is compiled, with what it would have to be.
-    let node = fields.take_entry(key)?.value;
-    let place = cx.place(&node);
-    if matches!(node.kind, Kind::List(_)) {
-        let message = format!("`{key}` must be one state, this is {}", node.describe());
-        cx.report(Finding::error(codes::TEXT_WRONG_TYPE, message).at(place).labelled("expected a text").help(
-            "write a transition for each, or put these states into one around them, and write that: a transition of a state serves for all inside",
-        ));
-        return None;
-    }
-    text(cx, &node, &format!("`{key}`"), fields.row(key).example).map(|text| (text, place))
-}
-
-/// Names to raise: one or a list.
-fn actions(cx: &mut Cx, fields: &mut Fields, key: &'static str) -> Vec<(Action, Origin)> {
-    let mut out = Vec::new();
-    for node in fields.several(cx, key) {
-        if matches!(node.kind, Kind::Function) {
-            function(cx, &node, &format!("`{key}`"));
-            continue;
-        }
-        let place = cx.place(&node);
-        let event = name::<EventName>(cx, &node, &format!("`{key}`"), fields.row(key).example);
-        out.extend(event.map(|event| (Action::Raise(event), place)));
-    }
-    out
-}
-
-/// A function in a chart: its place is known, its meaning comes later.
-fn function(cx: &mut Cx, node: &Node, what: &str) {
-    if !matches!(node.kind, Kind::Function) {
-        cx.wrong(
-            node,
-            what,
-            "a function (names of events stand in `entry`, `exit` and `effect`)",
-            "entry = \"e_ready\"",
-        );
-        return;
-    }
-    let message = format!("{what} is a function, and a coordinator that is not trusted must be pure");
-    cx.report(Finding::error(codes::CHART_FUNCTION, message).at(node.origin).labelled("in this one").help(
-        "write `trusted: true` in the deployment to let it run, or raise the name of an event instead \
-         (`entry = \"e_ready\"`) and let a component or a monitor do the work",
-    ));
 }

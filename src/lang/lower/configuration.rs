@@ -1,13 +1,14 @@
 //! Configurations: what both spellings mean.
 
-use super::{by_name, choice, condition, entries, name, own_name, value};
+use super::{by_name, choice, entries, name, own_name, value};
+use crate::lang::bound;
 use crate::lang::concern;
-use crate::lang::grammar::{BUFFER, CHANGES, CONFIGURATION, CONFIRM, UNDO, primitive as primitive_of};
+use crate::lang::grammar::{BUFFER, CHANGES, CONFIGURATION, UNDO, primitive as primitive_of};
 use crate::lang::tree::{Cx, Entry, Fields, Kind, Node};
-use crate::model::finding::{count, did_you_mean, nearest};
+use crate::model::finding::did_you_mean;
 use crate::model::{
-    Call, Change, ChangeKind, ComponentName, ConfigId, Configuration, Confirm, DefaultTwice, Finding, Ident, MemberRef,
-    OnFailure, Origin, Policy, RunState, StateEntry, StateList, Target, TypeName, Value, Wanted, codes,
+    Call, Change, ChangeKind, ComponentName, ConfigId, Configuration, Finding, Ident, MemberRef, OnFailure, Origin,
+    Policy, TypeName, Value, codes,
 };
 use std::collections::BTreeMap;
 
@@ -75,9 +76,9 @@ pub fn configuration(cx: &mut Cx, id: ConfigId, node: Node, origin: Origin) -> O
     let mut fields = Fields::new(&CONFIGURATION, origin, named);
     let mut c = Configuration::new(id);
     c.origin = origin;
-    if let Some(entry) = fields.take_entry("pre_conf_state") {
-        c.pre = states(cx, entry);
-    }
+    let [on_failure, confirms] =
+        ["on_failure", "confirm"].map(|key| fields.place(key).map(|origin| cx.part(origin, key)));
+    bound::CONFIGURATION.read(&mut c, &mut fields, cx);
     let mut changes = listed;
     if let Some(node) = fields.take(cx, "changes") {
         match node.kind {
@@ -91,29 +92,7 @@ pub fn configuration(cx: &mut Cx, id: ConfigId, node: Node, origin: Origin) -> O
     }
     c.changes = Vec::with_capacity(changes.len());
     c.changes.extend(changes.into_iter().filter_map(|node| change(cx, node)));
-    if let Some(entry) = fields.take_entry("post_conf_state") {
-        c.post = states(cx, entry);
-    }
-    c.timeout = fields.time(cx, "timeout");
-    c.group = fields.name(cx, "group");
-    c.safe = fields.truth(cx, "safe").unwrap_or_default();
-    let on_failure = fields.place("on_failure").map(|origin| cx.part(origin, "on_failure"));
-    let choices = [("rollback", OnFailure::Rollback), ("hold", OnFailure::Hold)];
-    c.on_failure = fields.choice(cx, "on_failure", &choices).unwrap_or_default();
-    if let Some(mut entry) = fields.take_entry("holds") {
-        // Lua knows the place of the whole configuration only.
-        if !matches!(entry.value.kind, Kind::Made(..) | Kind::Map(_)) {
-            entry.value.origin = cx.part(entry.value.origin, "holds");
-        }
-        c.holds = condition::condition(cx, entry.value, 0);
-    }
-    let confirms = fields.take_entry("confirm").map(|entry| {
-        c.confirm = confirm(cx, entry.value);
-        cx.part(entry.origin, "confirm")
-    });
     exclusive(cx, &c, on_failure, confirms);
-    c.irreversible = fields.truth(cx, "irreversible").unwrap_or_default();
-    c.description = fields.text(cx, "description");
     fields.finish(cx);
     Some(c)
 }
@@ -142,115 +121,6 @@ fn exclusive(cx: &mut Cx, c: &Configuration, on_failure: Option<Origin>, confirm
                 .help("leave `on_failure` out, or `safe`"),
         );
     }
-}
-
-fn confirm(cx: &mut Cx, node: Node) -> Option<Confirm> {
-    let mut fields = Fields::of(cx, node, &CONFIRM)?;
-    let event = fields.name(cx, "event");
-    let within = fields.time(cx, "within");
-    fields.finish(cx);
-    Some(Confirm { event: event?, within: within? })
-}
-
-/// A pre- or post-state list: entries `'comp:state'`, then at most one keyed `comp = 'state'`.
-fn states(cx: &mut Cx, entry: Entry) -> StateList {
-    const EXAMPLE: &str = "{ 'compA:running', '_default:stopped' }";
-    let list_origin = cx.part(entry.value.origin, &entry.key);
-    let (list, keyed) = match entry.value.kind {
-        Kind::List(list) => (list, Vec::new()),
-        Kind::Mixed(list, keyed) => (list, keyed),
-        Kind::Map(keyed) => (Vec::new(), keyed),
-        _ => {
-            cx.wrong(&entry.value, &format!("`{}`", entry.key), "a list of `component:state`", EXAMPLE);
-            return StateList::default();
-        }
-    };
-    // One key behind a list is the paper's, and Lua's alone.
-    if keyed.len() > 1 || (!keyed.is_empty() && !cx.is_lua(list_origin)) {
-        let as_list: Vec<String> = keyed
-            .iter()
-            .map(|e| match &e.value.kind {
-                Kind::Str(state) => format!("'{}:{state}'", e.key),
-                _ => format!("'{}:stopped'", e.key),
-            })
-            .collect();
-        let as_list = cx.spelt(list_origin, &format!("{{ {} }}", as_list.join(", ")));
-        cx.report(
-            Finding::error(
-                codes::CONF_KEYED_ENTRIES,
-                format!("`{}` has {}, and keys have no order", entry.key, count(keyed.len(), "keyed entry")),
-            )
-            .at(list_origin)
-            .labelled("in which order?")
-            .help(format!("write them as a list, in the order wanted: `{as_list}`")),
-        );
-    }
-    let mut found: Vec<StateEntry> = Vec::with_capacity(list.len() + keyed.len());
-    for node in list {
-        let Kind::Str(text) = &node.kind else {
-            cx.wrong(&node, "an entry of a state list", "a text `component:state`", EXAMPLE);
-            continue;
-        };
-        let origin = cx.inside(list_origin, node.origin, text);
-        let Some((who, state)) = text.rsplit_once(':') else {
-            let example = cx.spelt(list_origin, EXAMPLE);
-            cx.report(
-                Finding::error(codes::CONF_BAD_STATE, format!("`{text}` does not say which state"))
-                    .at(origin)
-                    .help(format!("write `component:state`, as in `{example}`")),
-            );
-            continue;
-        };
-        found.extend(state_entry(cx, who.trim(), state.trim(), origin));
-    }
-    for entry in keyed {
-        let Kind::Str(state) = &entry.value.kind else {
-            cx.wrong(&entry.value, "the state of a component", "a text", "_default = 'running'");
-            continue;
-        };
-        let origin = cx.inside(list_origin, entry.origin, &entry.key);
-        found.extend(state_entry(cx, &entry.key, state, origin));
-    }
-    let mut out = StateList::default();
-    for state in found {
-        if let Err(DefaultTwice(first)) = out.push(state) {
-            let finding = Finding::error(codes::DEFAULT_TWICE, format!("`_default` stands twice in `{}`", entry.key))
-                .at(state.origin)
-                .also(first, "first here")
-                .help("it stands for every component not named in the list, so it can only have one state: keep one");
-            cx.report(finding);
-        }
-    }
-    out
-}
-
-fn state_entry(cx: &mut Cx, who: &str, state: &str, origin: Origin) -> Option<StateEntry> {
-    let target = if who == "_default" {
-        Some(Target::Default)
-    } else {
-        let node = Node::new(Kind::Str(who.into()), origin);
-        name::<ComponentName>(cx, &node, "a component", "compA:running").map(Target::Component)
-    };
-    Some(StateEntry { target: target?, state: wanted(cx, state, origin)?, origin })
-}
-
-fn wanted(cx: &mut Cx, state: &str, origin: Origin) -> Option<Wanted> {
-    let named = RunState::from_name(state);
-    let wanted = named.and_then(RunState::wanted);
-    if named.is_some() && wanted.is_none() {
-        let finding = Finding::error(codes::FAULTED_DEMANDED, format!("no configuration can demand `{state}`"));
-        let help = "components become faulted by themselves; demand `unconfigured` to bring one out of it";
-        cx.report(finding.at(origin).help(help));
-    } else if wanted.is_none() {
-        // Our own names before the field's, which differ from them in a capital letter.
-        let ours = nearest(state, RunState::NAMES[..3].iter().copied());
-        let help = ours.map_or_else(
-            || did_you_mean(state, "states", RunState::NAMES.iter().copied()),
-            |near| format!("did you mean `{near}`?"),
-        );
-        cx.report(Finding::error(codes::CONF_BAD_STATE, format!("`{state}` is not a run state")).at(origin).help(help));
-    }
-    wanted
 }
 
 /// One change.

@@ -2,30 +2,23 @@
 
 use super::beside::{self, Fall, Rise};
 use super::interface::{self, SubsystemDraft};
-use super::{by_name, entries, name, names, once, own_name, simulated, text, types, value};
-use crate::lang::grammar::{ACTIVITY, DEPLOYMENT, LIMITS, TRUSTED};
+use super::{by_name, entries, name, own_name, simulated, text, types, value};
+use crate::lang::bound;
+use crate::lang::grammar::{ACTIVITY, DEPLOYMENT, Form, TRUSTED, TYPE};
 use crate::lang::tree::{Cx, Entry, Fields, Kind, Node};
 use crate::model::finding::did_you_mean;
 use crate::model::{
-    Activity, ComponentType, ConfigId, DeploymentLimits, EventName, Finding, Ident, Interface, MemberRef, Openings,
-    OperatorMay, Origin, SimulatedReaction, StepFault, Value, codes,
+    Activity, BringUp, Deployment, EventName, Finding, Ident, Openings, Origin, PlatformKind, TakeDown, Value, codes,
 };
 use std::collections::BTreeMap;
+use std::time::Duration;
 
 /// A deployment file, before the files that it names are read.
 pub struct Draft {
-    /// `name`
-    pub name: Option<Ident>,
-    /// `platform`
-    pub platform: Option<Ident>,
-    /// What stands under the platform's name.
-    pub platform_options: BTreeMap<Ident, Value>,
-    /// `libraries`
-    pub libraries: Vec<Ident>,
-    /// `types`
-    pub types: Vec<ComponentType>,
-    /// `activities`
-    pub activities: BTreeMap<Ident, Activity>,
+    /// What stands in it itself.
+    pub deployment: Deployment,
+    /// Whether all is there that must be; what is not has a name that nobody gave.
+    pub is_whole: bool,
     /// `configurations`: paths and where they are named.
     pub configurations: Vec<(String, Origin)>,
     /// `coordinator` and `coordinators`, in written order: names (none: called like the deployment), paths, and where.
@@ -38,14 +31,6 @@ pub struct Draft {
     pub host: Vec<(String, Origin)>,
     /// `with`: parameters of the Lua files.
     pub with: Vec<Entry>,
-    /// `emits`
-    pub emits: Vec<(EventName, Origin)>,
-    /// `safety`
-    pub safety: Vec<(EventName, Origin)>,
-    /// `operator`
-    pub operator: Vec<(OperatorMay, Origin)>,
-    /// `parameters`, `exports`, `accepts`, `leaving`
-    pub interface: Interface,
     /// Parameters that are not declared in order, which is said.
     pub ill: Vec<Ident>,
     /// `subsystems`
@@ -54,14 +39,34 @@ pub struct Draft {
     pub deploy: Option<Rise>,
     /// `shutdown`
     pub shutdown: Option<Fall>,
-    /// `limits`
-    pub limits: DeploymentLimits,
-    /// `simulated`
-    pub reactions: Vec<SimulatedReaction>,
-    /// `faults`
-    pub faults: Vec<StepFault>,
-    /// Where keys stand, by path.
-    pub key_origins: BTreeMap<String, Origin>,
+}
+
+impl Draft {
+    /// One with nothing in it.
+    fn new() -> Option<Self> {
+        let (nobody, event, within) = (Ident::new("unnamed").ok()?, EventName::new("unnamed").ok()?, Duration::ZERO);
+        let shutdown = TakeDown { event, within, rest: Vec::new() };
+        Some(Self {
+            deployment: Deployment::new(nobody, nobody, BringUp { event, within }, shutdown),
+            is_whole: true,
+            configurations: Vec::new(),
+            coordinators: Vec::new(),
+            monitors: Vec::new(),
+            trusted: None,
+            host: Vec::new(),
+            with: Vec::new(),
+            ill: Vec::new(),
+            subsystems: Vec::new(),
+            deploy: None,
+            shutdown: None,
+        })
+    }
+
+    /// What must be there, if it is.
+    fn needed<T>(&mut self, value: Option<T>) -> Option<T> {
+        self.is_whole &= value.is_some();
+        value
+    }
 }
 
 /// Notes where every key of the file stands, by its path. Types are left out, but for the others that they name: they carry their
@@ -70,7 +75,7 @@ fn note_keys(entries: &[Entry], prefix: &str, out: &mut BTreeMap<String, Origin>
     for entry in entries {
         if prefix.is_empty() && matches!(&*entry.key, "types" | "with") {
             if let (true, Kind::Map(types)) = (entry.key == "types", &entry.value.kind) {
-                types.iter().for_each(|ty| note_orders(ty, out));
+                types.iter().for_each(|ty| note_lists(ty, out));
             }
             continue;
         }
@@ -92,12 +97,11 @@ fn note_keys(entries: &[Entry], prefix: &str, out: &mut BTreeMap<String, Origin>
     }
 }
 
-/// Notes where a type lists names.
-fn note_orders(ty: &Entry, out: &mut BTreeMap<String, Origin>) {
+/// Notes where a type lists something: what its members are has places of its own.
+fn note_lists(ty: &Entry, out: &mut BTreeMap<String, Origin>) {
     let Kind::Map(keys) = &ty.value.kind else { return };
-    for entry in
-        keys.iter().filter(|entry| matches!(&*entry.key, "start_after" | "stop_before" | "exclusive" | "raises"))
-    {
+    let is_list = |entry: &&Entry| matches!(TYPE.key(&entry.key), Some(key) if matches!(key.form, Form::Several(_)));
+    for entry in keys.iter().filter(is_list) {
         note_keys(std::slice::from_ref(entry), &format!("types.{}", ty.key), out);
     }
 }
@@ -140,11 +144,17 @@ pub fn draft(cx: &mut Cx, node: Node, file_name: &str) -> Option<Draft> {
             _ => cx.wrong(&node, "`davit`", "a whole number (the format's version)", DEPLOYMENT.example),
         }
     }
-    let deployment = fields.needed(cx, "name", |_, _| format!("add `name: {file_name}`"));
-    let deployment = deployment.and_then(|node| name::<Ident>(cx, &node, "`name`", fields.row("name").example));
-    let (platform, platform_options) = platform(cx, &mut fields).unzip();
+    let mut out = Draft::new()?;
+    let own = fields.needed(cx, "name", |_, _| format!("add `name: {file_name}`"));
+    let own = own.and_then(|node| name::<Ident>(cx, &node, "`name`", fields.row("name").example));
+    out.needed(own).into_iter().for_each(|own| out.deployment.name = own);
+    let platform = platform(cx, &mut fields);
+    if let Some((platform, options)) = out.needed(platform) {
+        (out.deployment.platform, out.deployment.platform_options) = (platform, options);
+        out.deployment.kind = PlatformKind::of(platform);
+    }
     let named = fields.has("libraries");
-    let libraries = fields.names(cx, "libraries");
+    bound::DEPLOYMENT.read(&mut out.deployment, &mut fields, cx);
     let types = fields.take(cx, "types").map(|node| types::types(cx, node));
     if !named && types.is_none() && !fields.misspelt("types") {
         let row = fields.row("libraries");
@@ -154,58 +164,36 @@ pub fn draft(cx: &mut Cx, node: Node, file_name: &str) -> Option<Draft> {
             false => format!("add `{}`, or types of your own under `types`", row.example),
         });
     }
-    let activities = fields.take(cx, "activities").map(|node| activities(cx, node)).unwrap_or_default();
-    let configurations = files(cx, &mut fields, "configurations");
-    let coordinators = beside::coordinators(cx, &mut fields);
-    let monitors = files(cx, &mut fields, "monitors");
-    let trusted = fields.take(cx, "trusted").and_then(|node| trusted(cx, node));
-    if let (None, Some(origin)) = (trusted, fields.place("host")) {
+    out.deployment.types = types.unwrap_or_default();
+    out.deployment.activities = fields.take(cx, "activities").map(|node| activities(cx, node)).unwrap_or_default();
+    out.configurations = files(cx, &mut fields, "configurations");
+    out.coordinators = beside::coordinators(cx, &mut fields);
+    out.monitors = files(cx, &mut fields, "monitors");
+    out.trusted = fields.take(cx, "trusted").and_then(|node| trusted(cx, node));
+    if let (None, Some(origin)) = (out.trusted, fields.place("host")) {
         let finding = Finding::error(codes::TEXT_BAD_VALUE, "`host` is given to coordinators that are not trusted");
         cx.report(finding.at(origin).help("write `trusted: true` beside it, or leave it out"));
     }
-    let host = files(cx, &mut fields, "host");
-    let with = fields.entries(cx, "with");
-    let emits = names(cx, &mut fields, "emits", "`emits`");
-    let safety = names(cx, &mut fields, "safety", "`safety`");
-    let operator = operator(cx, &mut fields);
-    let (interface, ill) = interface::interface(cx, &mut fields);
-    let subsystems = interface::subsystems(cx, &mut fields);
+    out.host = files(cx, &mut fields, "host");
+    out.with = fields.entries(cx, "with");
+    (out.deployment.interface, out.ill) = interface::interface(cx, &mut fields);
+    out.subsystems = interface::subsystems(cx, &mut fields);
     let deploy = fields.take(cx, "deploy").and_then(|node| beside::rise(cx, node));
+    out.deploy = out.needed(deploy);
     let shutdown = fields.take(cx, "shutdown").and_then(|node| beside::fall(cx, node));
-    let limits = fields.take(cx, "limits").map(|node| limits(cx, node)).unwrap_or_default();
+    out.shutdown = out.needed(shutdown);
+    out.deploy.iter().for_each(|rise| out.deployment.deploy = rise.deploy);
+    out.shutdown.iter().for_each(|fall| out.deployment.shutdown = fall.shutdown.clone());
     if let Some(entry) = fields.take_entry("durability") {
         let finding = Finding::error(codes::DEPLOY_NO_JOURNAL, "`durability` says how a journal is kept");
         cx.report(finding.at(entry.origin).help("there is no journal yet; leave the key out"));
     }
-    let reactions = fields.take(cx, "simulated").map(|node| simulated::reactions(cx, node)).unwrap_or_default();
-    let faults = fields.take(cx, "faults").map(|node| simulated::faults(cx, node)).unwrap_or_default();
+    let reactions = fields.take(cx, "simulated").map(|node| simulated::reactions(cx, node));
+    out.deployment.reactions = reactions.unwrap_or_default();
+    out.deployment.faults = fields.take(cx, "faults").map(|node| simulated::faults(cx, node)).unwrap_or_default();
     fields.finish(cx);
-    Some(Draft {
-        name: deployment,
-        platform,
-        platform_options: platform_options.unwrap_or_default(),
-        libraries,
-        types: types.unwrap_or_default(),
-        activities,
-        configurations,
-        coordinators,
-        monitors,
-        trusted,
-        host,
-        with,
-        emits,
-        safety,
-        operator,
-        interface,
-        ill,
-        subsystems,
-        deploy,
-        shutdown,
-        limits,
-        reactions,
-        faults,
-        key_origins,
-    })
+    out.deployment.key_origins = key_origins;
+    Some(out)
 }
 
 /// `platform: NAME`, or `platform: { NAME: { option: value } }`.
@@ -277,46 +265,14 @@ fn trusted(cx: &mut Cx, node: Node) -> Option<Openings> {
     Some(out)
 }
 
-/// `operator`: configurations, and properties and in-ports as `Component.member`.
-fn operator(cx: &mut Cx, fields: &mut Fields) -> Vec<(OperatorMay, Origin)> {
-    let example = fields.row("operator").example;
-    let mut out = Vec::new();
-    for node in fields.several(cx, "operator") {
-        let is_member = matches!(&node.kind, Kind::Str(text) if text.contains('.'));
-        let may = if is_member {
-            name::<MemberRef>(cx, &node, "a property or port", example).map(OperatorMay::Set)
-        } else {
-            name::<ConfigId>(cx, &node, "a configuration", example).map(OperatorMay::Apply)
-        };
-        if let Some(may) = may {
-            once(cx, &mut out, may, node.origin, "`operator`");
-        }
-    }
-    out
-}
-
 fn activities(cx: &mut Cx, node: Node) -> BTreeMap<Ident, Activity> {
     let entries = entries(cx, node, "`activities`", ACTIVITY.example);
     let one = |cx: &mut Cx, _, entry: Entry| {
         let mut fields = Fields::of(cx, entry.value, &ACTIVITY)?;
-        let period = fields.time(cx, "period_ms");
-        let priority = fields.whole(cx, "priority").and_then(|p| u8::try_from(p).ok()).unwrap_or_default();
-        let cpu = fields.whole(cx, "cpu").and_then(|c| u32::try_from(c).ok());
+        let mut activity = Activity { origin: entry.origin, ..Activity::default() };
+        bound::ACTIVITY.read(&mut activity, &mut fields, cx);
         fields.finish(cx);
-        Some(Activity { period, priority, cpu, origin: entry.origin })
+        Some(activity)
     };
     by_name(cx, entries, "an activity", ACTIVITY.example, one).into_iter().collect()
-}
-
-fn limits(cx: &mut Cx, node: Node) -> DeploymentLimits {
-    let mut out = DeploymentLimits::default();
-    let Some(mut fields) = Fields::of(cx, node, &LIMITS) else { return out };
-    if let Some(v) = fields.whole(cx, "stack") {
-        out.stack = usize::try_from(v).unwrap_or(out.stack);
-    }
-    if let Some(v) = fields.time(cx, "step_timeout_s") {
-        out.step_timeout = v;
-    }
-    fields.finish(cx);
-    out
 }

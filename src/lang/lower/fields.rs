@@ -78,25 +78,6 @@ impl Fields {
         name(cx, &node, &format!("`{key}`"), self.row(key).example)
     }
 
-    /// One name or several.
-    pub fn names<T: FromStr<Err = NameError>>(&mut self, cx: &mut Cx, key: &'static str) -> Vec<T> {
-        let nodes = self.several(cx, key);
-        let example = self.row(key).example;
-        nodes.iter().filter_map(|node| name(cx, node, &format!("`{key}`"), example)).collect()
-    }
-
-    /// What `read` makes of a field that is there; none where it is not.
-    pub fn written<T>(
-        &mut self,
-        cx: &mut Cx,
-        key: &'static str,
-        read: fn(&mut Self, &mut Cx, &'static str) -> Option<T>,
-    ) -> Option<Option<T>> {
-        let written = self.has(key);
-        let value = read(self, cx, key);
-        written.then_some(value)
-    }
-
     /// The entries of a table of named values.
     pub fn entries(&mut self, cx: &mut Cx, key: &'static str) -> Vec<Entry> {
         let node = self.take(cx, key);

@@ -1,7 +1,8 @@
 //! What makes a deployment a part of another one: its parameters, what it shows, its subsystems.
 
-use super::types::{fitting, value_type};
+use super::types::fitting;
 use super::{by_name, entries, name, text, value};
+use crate::lang::bound;
 use crate::lang::grammar::{EXPORTS, LEAVING, PARAMETER, SUBSYSTEM};
 use crate::lang::tree::{Cx, Entry, Fields, Kind, Node};
 use crate::model::{
@@ -9,7 +10,6 @@ use crate::model::{
     ValueType, codes,
 };
 use std::collections::BTreeMap;
-use std::sync::Arc;
 
 /// A subsystem, before its file is read.
 pub struct SubsystemDraft {
@@ -61,16 +61,15 @@ fn named(cx: &mut Cx, node: Node, what: &str, example: &str) -> Vec<(Ident, Entr
 /// A parameter, if it is declared in order; else what is known of it.
 fn parameter(cx: &mut Cx, entry: Entry) -> Result<PropertyType, Option<PropertyType>> {
     let mut fields = Fields::of(cx, entry.value, &PARAMETER).ok_or(None)?;
-    let ty = fields.take(cx, "type").and_then(|node| value_type(cx, node));
-    let default = fields.take(cx, "default");
-    let (min, max) = (fields.number(cx, "min"), fields.number(cx, "max"));
-    let unit = fields.text(cx, "unit").map(Arc::from);
-    let doc = fields.text(cx, "doc").unwrap_or_default();
+    let default_at = fields.value_place("default");
+    let mut given = PropertyType { origin: entry.origin, ..PropertyType::new(ValueType::Bool, Tunable::default()) };
+    let is_whole = bound::PARAMETER.read(&mut given, &mut fields, cx);
     fields.finish(cx);
-    let (ty, origin) = (ty.ok_or(None)?, entry.origin);
-    let given = PropertyType { ty, default: None, min, max, tunable: Tunable::default(), unit, doc, origin };
-    let has_default = default.is_some();
-    let parameter = fitting(cx, given, default, "a parameter");
+    if !is_whole {
+        return Err(None);
+    }
+    let has_default = default_at.is_some();
+    let parameter = fitting(cx, given, default_at, "a parameter");
     let none_fits =
         parameter.ty == ValueType::Event || parameter.min.zip(parameter.max).is_some_and(|(min, max)| min > max);
     if none_fits || has_default && parameter.default.is_none() { Err(Some(parameter)) } else { Ok(parameter) }

@@ -41,7 +41,7 @@ fn own_name<T: FromStr<Err = NameError>>(cx: &mut Cx, entry: &Entry, what: &str,
 }
 
 /// Entries with plain names, and what `one` reads of each: those of which both can be read.
-fn by_name<T>(
+pub fn by_name<T>(
     cx: &mut Cx,
     entries: Vec<Entry>,
     what: &str,
@@ -56,7 +56,7 @@ fn by_name<T>(
     entries.into_iter().filter_map(read).collect()
 }
 
-fn bad_name(cx: &mut Cx, node: &Node, error: &NameError, example: &str) {
+pub fn bad_name(cx: &mut Cx, node: &Node, error: &NameError, example: &str) {
     let origin = cx.place(node);
     let example = cx.spelt(node.origin, example);
     let shown: String = error.text.chars().take(60).collect();
@@ -69,7 +69,7 @@ fn bad_name(cx: &mut Cx, node: &Node, error: &NameError, example: &str) {
 }
 
 /// A list of names, each of them once; `path` is the key's, for messages.
-fn names<T>(cx: &mut Cx, fields: &mut Fields, key: &'static str, path: &str) -> Vec<(T, Origin)>
+pub fn names<T>(cx: &mut Cx, fields: &mut Fields, key: &'static str, path: &str) -> Vec<(T, Origin)>
 where
     T: FromStr<Err = NameError> + PartialEq + std::fmt::Display,
 {
@@ -81,7 +81,13 @@ where
     out
 }
 
-fn once<T: PartialEq + std::fmt::Display>(cx: &mut Cx, out: &mut Vec<(T, Origin)>, name: T, origin: Origin, key: &str) {
+pub fn once<T: PartialEq + std::fmt::Display>(
+    cx: &mut Cx,
+    out: &mut Vec<(T, Origin)>,
+    name: T,
+    origin: Origin,
+    key: &str,
+) {
     match out.iter().find(|(other, _)| *other == name) {
         None => out.push((name, origin)),
         Some((_, first)) => {
@@ -242,7 +248,7 @@ pub fn time(cx: &mut Cx, node: &Node, what: &str, unit: Unit, example: &str) -> 
 }
 
 /// The seconds that a text such as `500ms` means.
-fn parse_time(text: &str) -> Option<f64> {
+pub fn parse_time(text: &str) -> Option<f64> {
     let text = text.trim();
     let end = text.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(text.len());
     let number: f64 = text[..end].parse().ok()?;

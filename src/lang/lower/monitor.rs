@@ -1,10 +1,11 @@
 //! Monitors: what both spellings mean.
 
-use super::{condition, entries, own_name};
+use super::{entries, own_name};
+use crate::lang::bound;
 use crate::lang::grammar::MONITOR;
 use crate::lang::tree::{Cx, Entry, Fields, Kind, Node};
-use crate::model::monitor::Sampling;
-use crate::model::{EventName, Finding, Ident, Monitor, Origin, codes};
+use crate::model::monitor::{Condition, ConditionKind};
+use crate::model::{Finding, Ident, Monitor, Origin, codes};
 use rustc_hash::FxHashMap;
 
 /// A map of named monitors, in the order given.
@@ -38,32 +39,18 @@ fn monitor(cx: &mut Cx, entry: Entry) -> Option<Monitor> {
         }
     };
     let mut fields = Fields::new(&MONITOR, origin, entries);
-    let when = fields.take(cx, "when");
-    let when = when.and_then(|node| condition::condition(cx, node, 0));
-    let raise: Option<EventName> = fields.name(cx, "event");
-    let cleared = fields.name(cx, "cleared");
-    let repeats = fields.time(cx, "repeat_every");
-    let repeat = repeats.filter(|_| raise.is_some());
-    if repeats.is_some() && repeat.is_none() {
+    let nothing = Condition::new(ConditionKind::All(Vec::new()));
+    let mut monitor = Monitor::new(id.or_else(|| Ident::new("unnamed").ok())?, nothing);
+    monitor.origin = origin;
+    let is_whole = bound::MONITOR.read(&mut monitor, &mut fields, cx);
+    fields.finish(cx);
+    if monitor.repeat.is_some() && monitor.raise.is_none() {
         let finding =
             Finding::warning(codes::MONITOR_NOTHING_REPEATED, "`repeat_every` repeats nothing: there is no `event`");
         cx.report(finding.at(origin).help("name the event that is to be repeated, or leave `repeat_every` out"));
+        monitor.repeat = None;
     }
-    let every = fields.time(cx, "every");
-    let enabled = fields.truth(cx, "enabled");
-    let description = fields.text(cx, "description");
-    fields.finish(cx);
-    Some(Monitor {
-        name: id?,
-        when: when?,
-        raise,
-        cleared,
-        repeat,
-        sampling: every.map_or(Sampling::OnSample, Sampling::Every),
-        enabled: enabled.unwrap_or(true),
-        description,
-        origin,
-    })
+    (id.is_some() && is_whole).then_some(monitor)
 }
 
 /// Reports monitors of the same name, and keeps the first of each.

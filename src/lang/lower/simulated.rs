@@ -1,9 +1,11 @@
 //! `simulated`: what the components of the simulated platform do by themselves; `faults`: what goes wrong on it.
 
 use super::text;
+use crate::lang::bound;
 use crate::lang::grammar::{FAULT, REACTION, SIMULATED};
 use crate::lang::tree::{Cx, Fields, Kind, Node};
-use crate::model::{FaultKind, Origin, SimulatedReaction, StepFault};
+use crate::model::{ComponentName, EventName, FaultKind, Finding, Origin, SimulatedReaction, StepFault, codes};
+use std::time::Duration;
 
 /// Lowers the key `simulated`.
 pub fn reactions(cx: &mut Cx, node: Node) -> Vec<SimulatedReaction> {
@@ -24,19 +26,14 @@ fn reaction(cx: &mut Cx, node: Node) -> Option<SimulatedReaction> {
     let origin = node.origin;
     let mut fields = Fields::of(cx, node, &REACTION)?;
     let after = step(cx, &mut fields, origin, "after");
-    let raise = fields.name(cx, "raise");
-    let component = fields.name(cx, "component");
-    let delay = fields.written(cx, "delay_s", Fields::time);
+    // Both names are required, so that none of these is ever one.
+    let (raise, component) = (EventName::new("unnamed").ok()?, ComponentName::new("unnamed").ok()?);
+    let mut reaction = SimulatedReaction { after: String::new(), delay: Duration::ZERO, raise, component, origin };
+    let is_whole = bound::REACTION.read(&mut reaction, &mut fields, cx);
     fields.finish(cx);
     // What is wrong may be in any of its keys.
     let (after, _) = after?;
-    Some(SimulatedReaction {
-        after,
-        delay: delay.unwrap_or(Some(std::time::Duration::ZERO))?,
-        raise: raise?,
-        component: component?,
-        origin,
-    })
+    is_whole.then_some(SimulatedReaction { after, ..reaction })
 }
 
 /// The text of a step with its place; without one of its own, that of what it stands in.
@@ -61,25 +58,20 @@ fn fault(cx: &mut Cx, node: Node) -> Option<StepFault> {
     let origin = node.origin;
     let mut fields = Fields::of(cx, node, &FAULT)?;
     let step = self::step(cx, &mut fields, origin, "step");
-    let how = fields.choice(cx, "how", FaultKind::WORDS);
-    let times = fields.written(cx, "times", Fields::whole);
-    let takes = match (how, fields.has("takes_s")) {
-        (Some(how), true) if how != FaultKind::Slow => {
-            if let Some(node) = fields.take(cx, "takes_s") {
-                cx.wrong(&node, "`takes_s`", "nothing: only `slow` takes time", "how: slow, takes_s: 0.5");
-            }
-            None
+    let takes = fields.has("takes_s").then(|| fields.value_place("takes_s").unwrap_or(origin));
+    let mut fault = StepFault { step: String::new(), how: FaultKind::Fail, times: 1, takes: Duration::ZERO, origin };
+    let is_whole = bound::FAULT.read(&mut fault, &mut fields, cx);
+    let is_slow = fault.how == FaultKind::Slow;
+    match takes {
+        Some(place) if is_whole && !is_slow => {
+            let message = format!("`takes_s` stands beside `how: {}`: only `slow` takes time", fault.how);
+            let finding = Finding::error(codes::TEXT_WRONG_TYPE, message).at(place);
+            cx.report(finding.help("write `how: slow`, or leave `takes_s` out"));
         }
-        (Some(FaultKind::Slow), false) => {
-            fields.needed(cx, "takes_s", |_, _| "add `takes_s: 0.5`".to_owned()).and(None)
-        }
-        (_, written) => {
-            let takes = fields.time(cx, "takes_s");
-            if written { takes } else { Some(std::time::Duration::ZERO) }
-        }
-    };
+        None if is_slow => _ = fields.needed(cx, "takes_s", |_, _| "add `takes_s: 0.5`".to_owned()),
+        _ => {}
+    }
     fields.finish(cx);
-    let times = times.unwrap_or(Some(1)).and_then(|n| u32::try_from(n).ok());
     let (step, origin) = step?;
-    Some(StepFault { step, how: how?, times: times?, takes: takes?, origin })
+    is_whole.then_some(StepFault { step, origin, ..fault })
 }

@@ -3,6 +3,7 @@
 use super::wrap::wrap;
 use super::{change, fields, float, monitor};
 use crate::diagnostics::Language;
+use crate::lang::bound::{self, Pen};
 use crate::model::monitor::Condition;
 use crate::model::statechart::{ChartNode, State};
 use crate::model::{Configuration, Statechart, Value};
@@ -69,8 +70,9 @@ pub fn configurations_lua(list: &[Configuration]) -> String {
     let mut out = String::from("ConfiguratorConf {\n");
     for (i, c) in list.iter().enumerate() {
         _ = writeln!(out, "{}  {} = Configuration {{", if i == 0 { "" } else { "\n" }, key(c.id.as_str()));
-        let holds = |of: &Condition| wrap(&monitor::condition(of, Language::Lua), 12, 4);
-        let [before, behind] = fields::of_configuration(c, Language::Lua, holds);
+        let mut holds = |of: &Condition| wrap(&monitor::condition(of, Language::Lua), 12, 4);
+        let keys = bound::CONFIGURATION.written(c, &mut Pen { language: Language::Lua, condition: &mut holds });
+        let (before, behind) = fields::around(&keys, "post_conf_state");
         fields::lines(&mut out, "    ", before, Language::Lua);
         c.changes.iter().for_each(|c| _ = writeln!(out, "    {},", change::in_lua(&c.kind)));
         fields::lines(&mut out, "    ", behind, Language::Lua);
@@ -84,20 +86,24 @@ fn state(out: &mut String, s: &State, indent: usize) {
     out.push_str("state {");
     let pad = "  ".repeat(indent + 1);
     let mut body = String::new();
-    fields::lines(&mut body, &pad, fields::of_state(s, Language::Lua), Language::Lua);
+    fields::lines(&mut body, &pad, &bound::STATE.plain(s, Language::Lua), Language::Lua);
     for child in &s.children {
         _ = write!(body, "{pad}{} = ", key(child.name().as_str()));
         match child {
             ChartNode::State(child) => state(&mut body, child, indent + 1),
             ChartNode::Connector(connector) => {
-                let doc = connector.doc.as_ref().map_or(String::new(), |doc| format!(" doc = {} ", quoted(doc)));
-                _ = write!(body, "conn {{{doc}}}");
+                let keys = bound::CONNECTOR.plain(connector, Language::Lua);
+                _ = write!(
+                    body,
+                    "conn {}",
+                    if keys.is_empty() { "{}".to_owned() } else { fields::table(keys, Language::Lua) }
+                );
             }
         }
         body.push_str(",\n");
     }
     for t in &s.transitions {
-        let keys = fields::table(fields::of_transition(t, Language::Lua), Language::Lua);
+        let keys = fields::table(bound::TRANSITION.plain(t, Language::Lua), Language::Lua);
         _ = writeln!(body, "{pad}trans {keys},");
     }
     if !body.is_empty() {

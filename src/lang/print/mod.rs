@@ -2,7 +2,7 @@
 //! way things were written (loops, parameters, one file or several) are not part of a model and are lost.
 
 mod change;
-mod fields;
+pub mod fields;
 mod kept;
 mod lua;
 mod monitor;
@@ -83,7 +83,7 @@ pub fn kept(deployment: &Deployment) -> Vec<(Ident, String)> {
 }
 
 /// A float that reads back as the same float, and as a float in every reader of YAML: with a point.
-fn float(v: f64) -> String {
+pub fn float(v: f64) -> String {
     let text = format!("{v:?}");
     match text.split_once('e') {
         Some((mantissa, exponent)) if !mantissa.contains('.') => format!("{mantissa}.0e{exponent}"),
@@ -101,11 +101,13 @@ fn decimal(time: Duration, digits: u32) -> String {
     format!("{whole}.{}", if fraction.is_empty() { "0" } else { fraction })
 }
 
-fn seconds(time: Duration) -> String {
+/// A time in seconds.
+pub fn seconds(time: Duration) -> String {
     decimal(time, 9)
 }
 
-fn milliseconds(time: Duration) -> String {
+/// A time in milliseconds.
+pub fn milliseconds(time: Duration) -> String {
     decimal(time, 6)
 }
 

@@ -4,6 +4,7 @@ use super::fields::{self, list, text};
 use super::wrap::wrap;
 use super::{float, lua, seconds, yaml};
 use crate::diagnostics::Language;
+use crate::lang::bound::{self, Pen};
 use crate::model::Monitor;
 use crate::model::monitor::{Condition, ConditionKind, Interval, MonitoredSignal, SignalKind};
 use std::collections::HashMap;
@@ -176,8 +177,9 @@ pub fn monitors(list: &[Monitor], language: Language) -> String {
             _ = writeln!(out, "  {}:", yaml::text(m.name.as_str()));
         }
         // In YAML every line of a value stands further right than its key.
-        let when = wrap(&shared.print(&m.when, language), 11, if is_lua { 4 } else { 6 });
-        fields::lines(&mut out, "    ", fields::of_monitor(m, language, when), language);
+        let mut when = |of: &Condition| wrap(&shared.print(of, language), 11, if is_lua { 4 } else { 6 });
+        let keys = bound::MONITOR.written(m, &mut Pen { language, condition: &mut when });
+        fields::lines(&mut out, "    ", &keys, language);
         if is_lua {
             out.push_str("  },\n");
         }

@@ -1,15 +1,17 @@
 //! Printing in YAML.
 
-use super::monitor::{self, CommonConditions};
+use super::monitor::CommonConditions;
 use super::wrap::wrap;
-use super::{change, fields, float, milliseconds, seconds};
+use super::{change, fields, float, seconds};
 use crate::diagnostics::Language;
+use crate::lang::bound::{self, BoundTable, Pen, WrittenKey};
 use crate::model::monitor::Condition;
 use crate::model::statechart::{ChartNode, State};
 use crate::model::{
-    ComponentType, Configuration, Coordinator, CoordinatorNaming, Deployment, Effect, Ident, Interface, MemberClass,
-    Statechart, Tunable, Value,
+    ComponentType, Configuration, Coordinator, CoordinatorNaming, Deployment, Ident, Interface, MemberClass,
+    Statechart, Value,
 };
+use std::collections::BTreeMap;
 use std::fmt::{Display, Write as _};
 
 /// A text: plain where every reader takes it for a text, else in quotes.
@@ -82,8 +84,9 @@ pub fn configurations_yaml(configurations: &[Configuration]) -> String {
     let mut shared = CommonConditions::of(configurations.iter().filter_map(|c| c.holds.as_ref()), Language::Yaml);
     for c in configurations {
         let mut body = String::new();
-        let holds = |of: &Condition| wrap(&shared.print(of, Language::Yaml), 11, 6);
-        let [before, behind] = fields::of_configuration(c, Language::Yaml, holds);
+        let mut holds = |of: &Condition| wrap(&shared.print(of, Language::Yaml), 11, 6);
+        let keys = bound::CONFIGURATION.written(c, &mut Pen { language: Language::Yaml, condition: &mut holds });
+        let (before, behind) = fields::around(&keys, "post_conf_state");
         fields::lines(&mut body, "    ", before, Language::Yaml);
         if !c.changes.is_empty() {
             body.push_str("    changes:\n");
@@ -105,7 +108,7 @@ pub fn configurations_yaml(configurations: &[Configuration]) -> String {
 fn state(out: &mut String, s: &State, indent: usize) {
     let pad = "  ".repeat(indent);
     let mut body = String::new();
-    fields::lines(&mut body, &pad, fields::of_state(s, Language::Yaml), Language::Yaml);
+    fields::lines(&mut body, &pad, &bound::STATE.plain(s, Language::Yaml), Language::Yaml);
     if !s.children.is_empty() {
         _ = writeln!(body, "{pad}states:");
         for child in &s.children {
@@ -113,8 +116,9 @@ fn state(out: &mut String, s: &State, indent: usize) {
             match child {
                 ChartNode::State(child) => state(&mut body, child, indent + 2),
                 ChartNode::Connector(c) => {
-                    let doc = c.doc.as_ref().map_or(String::new(), |doc| format!(", doc: {}", quoted(doc)));
-                    _ = writeln!(body, " {{ connector: true{doc} }}");
+                    let mut keys = vec![("connector", "true".to_owned())];
+                    keys.extend(bound::CONNECTOR.plain(c, Language::Yaml));
+                    _ = writeln!(body, " {}", fields::table(keys, Language::Yaml));
                 }
             }
         }
@@ -122,7 +126,7 @@ fn state(out: &mut String, s: &State, indent: usize) {
     if !s.transitions.is_empty() {
         _ = writeln!(body, "{pad}transitions:");
         for t in &s.transitions {
-            let keys = fields::table(fields::of_transition(t, Language::Yaml), Language::Yaml);
+            let keys = fields::table(bound::TRANSITION.plain(t, Language::Yaml), Language::Yaml);
             _ = writeln!(body, "{pad}  - {keys}");
         }
     }
@@ -138,7 +142,7 @@ fn interface(out: &mut String, of: &Interface) {
     if !of.accepts.is_empty() {
         _ = writeln!(out, "accepts: {}", list(of.accepts.iter().map(|(event, _)| t(event))));
     }
-    if !of.exports.is_empty() {
+    if !of.exports.is_empty() || of.from.is_some() {
         out.push_str("exports:\n");
         for (_, kind) in MemberClass::WORDS {
             let own: Vec<String> = of
@@ -167,88 +171,31 @@ pub fn coordinator_yaml(chart: &Statechart) -> String {
     out
 }
 
+/// Named things of one kind, each in a line.
+fn members<T>(out: &mut String, key: &str, of: &BTreeMap<Ident, T>, table: &BoundTable<T>) {
+    if !of.is_empty() {
+        _ = writeln!(out, "    {key}:");
+    }
+    for (name, member) in of {
+        _ = writeln!(out, "      {}: {}", t(name), flow(table, member));
+    }
+}
+
+/// The keys of a table, in one line.
+fn flow<T>(table: &BoundTable<T>, of: &T) -> String {
+    fields::table(table.plain(of, Language::Yaml), Language::Yaml)
+}
+
 fn component_type(out: &mut String, ty: &ComponentType) {
     _ = writeln!(out, "  {}:", t(&ty.name));
     let mut body = String::new();
-    if !ty.doc.is_empty() {
-        _ = writeln!(body, "    doc: {}", quoted(&ty.doc));
-    }
-    let doc = |doc: &str| if doc.is_empty() { String::new() } else { format!(", doc: {}", quoted(doc)) };
-    let unit =
-        |unit: &Option<std::sync::Arc<str>>| unit.as_ref().map_or(String::new(), |u| format!(", unit: {}", text(u)));
-    if !ty.ports.is_empty() {
-        body.push_str("    ports:\n");
-    }
-    for (name, port) in &ty.ports {
-        let direction = port.direction.word();
-        let buffered = if port.buffered { ", buffered: true" } else { "" };
-        let required = if port.required { ", required: true" } else { "" };
-        let (ty, unit, doc) = (text(&port.ty.to_string()), unit(&port.unit), doc(&port.doc));
-        _ = writeln!(
-            body,
-            "      {}: {{ direction: {direction}, type: {ty}{unit}{buffered}{required}{doc} }}",
-            t(name)
-        );
-    }
-    if !ty.properties.is_empty() {
-        body.push_str("    properties:\n");
-    }
-    for (name, property) in &ty.properties {
-        let mut parts = format!("type: {}", text(&property.ty.to_string()));
-        if let Some(default) = &property.default {
-            _ = write!(parts, ", default: {}", value(default));
-        }
-        for (name, limit) in [("min", property.min), ("max", property.max)] {
-            if let Some(limit) = limit {
-                _ = write!(parts, ", {name}: {}", float(limit));
-            }
-        }
-        if property.tunable != Tunable::Always {
-            _ = write!(parts, ", tunable: {}", property.tunable);
-        }
-        _ = writeln!(body, "      {}: {{ {parts}{}{} }}", t(name), unit(&property.unit), doc(&property.doc));
-    }
-    if !ty.operations.is_empty() {
-        body.push_str("    operations:\n");
-    }
-    for (name, operation) in &ty.operations {
-        let args = list(operation.args.iter().map(|ty| text(&ty.to_string())));
-        let returns =
-            operation.returns.as_ref().map_or(String::new(), |ty| format!(", returns: {}", text(&ty.to_string())));
-        let effect = match &operation.effect {
-            Effect::None => "none".to_owned(),
-            Effect::Irreversible => "irreversible".to_owned(),
-            Effect::Undo(operation) => format!("{{ undo: {} }}", t(operation)),
-        };
-        let moves = if operation.moves { ", moves: true" } else { "" };
-        let settled = operation.settled_by.as_ref();
-        let settled = settled.map(|c| format!(", settled_by: {}", monitor::condition(c, Language::Yaml)));
-        let (settled, doc) = (settled.unwrap_or_default(), doc(&operation.doc));
-        _ = writeln!(body, "      {}: {{ args: {args}{returns}, effect: {effect}{moves}{settled}{doc} }}", t(name));
-    }
-    if !ty.raises.is_empty() {
-        _ = writeln!(body, "    raises: {}", list(ty.raises.keys().map(|event| t(event))));
-    }
-    for (name, types) in [("start_after", &ty.start_after), ("stop_before", &ty.stop_before)] {
-        if !types.is_empty() {
-            _ = writeln!(body, "    {name}: {}", list(types.iter().map(|ty| t(ty))));
-        }
-    }
-    if ty.actuator {
-        body.push_str("    actuator: true\n");
-    }
-    let lost = ty.irreversible;
-    let irreversible = [(lost.configure, "configure"), (lost.stop, "stop"), (lost.destroy, "destroy")];
-    let moves = [(ty.moves.start, "start"), (ty.moves.stop, "stop")];
-    for (key, marks) in [("moves", &moves[..]), ("irreversible", &irreversible)] {
-        let marks: Vec<String> = marks.iter().filter(|(is, _)| *is).map(|(_, name)| (*name).to_owned()).collect();
-        if !marks.is_empty() {
-            _ = writeln!(body, "    {key}: {}", list(marks));
-        }
-    }
-    if !ty.exclusive.is_empty() {
-        _ = writeln!(body, "    exclusive: {}", list(ty.exclusive.iter().map(|name| text(&name.to_string()))));
-    }
+    let keys = bound::TYPE.plain(ty, Language::Yaml);
+    let doc = usize::from(keys.first().is_some_and(|(key, _)| *key == "doc"));
+    fields::lines(&mut body, "    ", &keys[..doc], Language::Yaml);
+    members(&mut body, "ports", &ty.ports, &bound::PORT);
+    members(&mut body, "properties", &ty.properties, &bound::PROPERTY);
+    members(&mut body, "operations", &ty.operations, &bound::OPERATION);
+    fields::lines(&mut body, "    ", &keys[doc..], Language::Yaml);
     if body.is_empty() {
         out.truncate(out.trim_end().len());
         out.push_str(" {}\n");
@@ -271,7 +218,9 @@ pub fn deployment_yaml(
         false => format!("{{ {}: {{ {} }} }}", t(&d.platform), options.join(", ")),
     };
     let mut out = format!("davit: 1\nname: {}\nplatform: {platform}\n", t(&d.name));
-    _ = writeln!(out, "libraries: {}", list(d.libraries.iter().map(|l| t(l))));
+    let keys = bound::DEPLOYMENT.plain(d, Language::Yaml);
+    let (libraries, others) = keys.split_at(1);
+    fields::lines(&mut out, "", libraries, Language::Yaml);
     if !d.types.is_empty() {
         out.push_str("types:\n");
         d.types.iter().for_each(|ty| component_type(&mut out, ty));
@@ -280,18 +229,7 @@ pub fn deployment_yaml(
         out.push_str("activities:\n");
     }
     for (name, activity) in &d.activities {
-        let mut parts = Vec::new();
-        if let Some(period) = activity.period {
-            parts.push(format!("period_ms: {}", milliseconds(period)));
-        }
-        if activity.priority > 0 {
-            parts.push(format!("priority: {}", activity.priority));
-        }
-        if let Some(cpu) = activity.cpu {
-            parts.push(format!("cpu: {cpu}"));
-        }
-        let parts = if parts.is_empty() { "{}".to_owned() } else { format!("{{ {} }}", parts.join(", ")) };
-        _ = writeln!(out, "  {}: {parts}", t(name));
+        _ = writeln!(out, "  {}: {}", t(name), flow(&bound::ACTIVITY, activity));
     }
     _ = writeln!(out, "configurations: {}", list(configurations.iter().map(|file| text(file))));
     let files = || d.coordinators.iter().zip(coordinators);
@@ -309,16 +247,8 @@ pub fn deployment_yaml(
     if let Some(monitors) = monitors {
         _ = writeln!(out, "monitors: {}", list([text(monitors)]));
     }
-    if !d.emits.is_empty() {
-        _ = writeln!(out, "emits: {}", list(d.emits.iter().map(|(event, _)| t(event))));
-    }
     interface(&mut out, &d.interface);
-    if !d.safety.is_empty() {
-        _ = writeln!(out, "safety: {}", list(d.safety.iter().map(|(event, _)| t(event))));
-    }
-    if !d.operator.is_empty() {
-        _ = writeln!(out, "operator: {}", list(d.operator.iter().map(|(may, _)| t(may))));
-    }
+    fields::lines(&mut out, "", others, Language::Yaml);
     // With one coordinator its states need no name before them; with several each has its own.
     let one = d.coordinators.len() == 1;
     let own = |c: &Coordinator, state: &str| text(&if one { state.to_owned() } else { format!("{}:{state}", c.name) });
@@ -334,29 +264,21 @@ pub fn deployment_yaml(
     let rest = list(d.shutdown.rest.iter().map(|(id, _)| t(id)));
     let rest = if d.shutdown.rest.is_empty() { String::new() } else { format!(", rest: {rest}") };
     _ = writeln!(out, "shutdown: {{ event: {event}, down: {down}, within_s: {within}{rest} }}");
-    let (stack, timeout) = (d.limits.stack, seconds(d.limits.step_timeout));
-    _ = writeln!(out, "limits: {{ stack: {stack}, step_timeout_s: {timeout} }}");
     if !d.reactions.is_empty() {
         out.push_str("simulated:\n  reactions:\n");
     }
+    let one = |step: (&'static str, &str), keys: Vec<WrittenKey>| {
+        fields::table([(step.0, text(step.1))].into_iter().chain(keys), Language::Yaml)
+    };
     for reaction in &d.reactions {
-        let delay =
-            if reaction.delay.is_zero() { String::new() } else { format!("delay_s: {}, ", seconds(reaction.delay)) };
-        _ = writeln!(
-            out,
-            "    - {{ after: {}, {delay}raise: {}, component: {} }}",
-            text(&reaction.after),
-            t(&reaction.raise),
-            t(&reaction.component)
-        );
+        let keys = bound::REACTION.plain(reaction, Language::Yaml);
+        _ = writeln!(out, "    - {}", one(("after", &reaction.after), keys));
     }
     if !d.faults.is_empty() {
         out.push_str("faults:\n");
     }
     for fault in &d.faults {
-        let times = if fault.times == 1 { String::new() } else { format!(", times: {}", fault.times) };
-        let takes = if fault.takes.is_zero() { String::new() } else { format!(", takes_s: {}", seconds(fault.takes)) };
-        _ = writeln!(out, "  - {{ step: {}, how: {}{takes}{times} }}", text(&fault.step), fault.how.word());
+        _ = writeln!(out, "  - {}", one(("step", &fault.step), bound::FAULT.plain(fault, Language::Yaml)));
     }
     out
 }
