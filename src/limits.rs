@@ -41,6 +41,9 @@ pub const SOCKET_CONNECTIONS: usize = 32;
 /// people who ask at the same time, and two that are still being told that they are too many.
 pub const SOCKET_KEPT: usize = 4;
 
+/// How many of these one process may have at a time: one that asks again and again takes none from the others.
+pub const SOCKET_KEPT_EACH: usize = 1;
+
 /// How long a connection on one of these may take to say what it wants: a program that connects knows it.
 pub const SOCKET_SAY: Duration = Duration::from_secs(2);
 

@@ -336,6 +336,11 @@ impl Graph<'_, '_> {
             let failed =
                 trace.iter().flat_map(TraceStep::answers).any(|told| not_undone.iter().any(|e| e.as_str() == told));
             let (how, help) = match (failed, self.is_scoped(id)) {
+                // What is safe is not undone so that it can come again.
+                (true, _) if self.product.worlds.configuration(id).is_some_and(|c| c.safe) => (
+                    "after its undo has failed",
+                    "give it a group: then one frame of it is in force, however often it is asked for".to_owned(),
+                ),
                 (true, _) => (
                     "after its undo has failed",
                     format!(

@@ -55,6 +55,7 @@ mod kept;
 mod known;
 mod lasts;
 mod late;
+mod led_on;
 mod let_go;
 mod lets_go;
 mod library;

@@ -13,7 +13,7 @@ use super::report::{Accepted, Explored, Report};
 use super::state::Failed;
 use super::verdict::CheckVerdict;
 use super::{
-    alone, composed, configurations as single, coordinator, coupling, declared, interface, lets_go, library,
+    alone, composed, configurations as single, coordinator, coupling, declared, interface, led_on, lets_go, library,
     monitors as watched, paths, purity, safety, settings, simulated, slips, types, undriven, unhandled, universe,
     unwatched, ways,
 };
@@ -63,6 +63,7 @@ fn run_one(
     findings.extend(declared::check(deployment, &universe));
     findings.extend(lets_go::check(deployment, &universe));
     findings.extend(alone::check(deployment));
+    findings.extend(safety::unnamed(deployment, catalogue));
     let written = deployment.charts();
     let mut charts = Vec::new();
     let mut all = 0;
@@ -100,6 +101,7 @@ fn run_one(
             let known = slips::KnownEvents::new(view, &universe, &told, &waited_for);
             findings.extend(coordinator::check(view, chart, &known));
             findings.extend(unhandled::check(view, chart));
+            findings.extend(led_on::check(view, chart));
             findings.extend(purity::check(view));
         }
         // Another one may wait for what starts and ends the deployment, and tell the others.

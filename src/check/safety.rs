@@ -9,7 +9,7 @@ use super::state::{Failed, Move, Next, ProductState};
 use crate::limits;
 use crate::model::codes::COORD_SAFETY_UNHEARD;
 use crate::model::finding::{count, did_you_mean};
-use crate::model::{Ask, ConfigId, Deployment, EventName, Finding, Findings, Origin, Severity};
+use crate::model::{Ask, Catalogue, ChangeKind, ConfigId, Deployment, EventName, Finding, Findings, Origin, Severity};
 use crate::statechart::{Chart, EventId, NodeId};
 use rustc_hash::{FxHashMap, FxHashSet};
 use smallvec::SmallVec;
@@ -23,6 +23,25 @@ pub(super) fn unhandled(deployment: &Deployment, charts: &[&Chart]) -> Findings 
         Some(Finding::warning(COORD_SAFETY_UNHEARD, message).at(*at).path("safety").help(help))
     };
     deployment.safety.iter().filter_map(event).collect()
+}
+
+/// That something moves, and no event is named that stops it.
+pub(super) fn unnamed(deployment: &Deployment, catalogue: &Catalogue) -> Option<Finding> {
+    if !deployment.safety.is_empty() {
+        return None;
+    }
+    let changes = deployment.configurations.iter().flat_map(|of| &of.changes);
+    let (component, at) = changes.into_iter().find_map(|change| match &change.kind {
+        ChangeKind::Create { component, ty, .. } | ChangeKind::Replace { component, ty, .. } => {
+            catalogue.get(*ty).is_some_and(|ty| ty.actuator).then_some((component, change.origin))
+        }
+        _ => None,
+    })?;
+    let message = format!("`{component}` moves something (`actuator: true`), and no event is named under `safety`");
+    let help = "name the event that stops it, `safety: [e_stop]`, and let it lead to a `safe` configuration: it is heard before all others, also while the \
+                deployment is being stopped, and `davit check` looks for places where it is not";
+    let finding = Finding::warning(COORD_SAFETY_UNHEARD, message).at(deployment.key_origin("name"));
+    Some(finding.path("safety").also(at, "it is made here").help(help))
 }
 
 /// What may have been meant by a safety event that no coordinator listens to; none: one does, or a function may.

@@ -121,6 +121,7 @@ pub const READ: &[(&str, &[Code])] = &[
             COORD_NEVER_EMITTED,
             COORD_NEAR_EVENT,
             COORD_FAILURE_UNHANDLED,
+            COORD_SAFE_LEFT,
             COORD_NOT_PURE,
         ],
     ),

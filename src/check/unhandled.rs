@@ -52,13 +52,24 @@ pub fn check(deployment: &Deployment, chart: &Chart) -> Findings {
             Finding::info(COORD_FAILURE_UNHANDLED, message)
         };
         findings.push(finding.at(site.origin).labelled(format!("asks for {name}")).path(place(chart, site.when)).help(
-            format!(
-                "add a transition on {} that leaves the state, so that the coordinator does not wait for ever",
-                list.join(", ")
-            ),
+            match is_held(deployment, site, ask) {
+                true => format!(
+                    "add a transition on {} between two states inside of this one: leaving it would take back what was done of the emergency",
+                    list.join(", ")
+                ),
+                false => format!(
+                    "add a transition on {} that leaves the state, so that the coordinator does not wait for ever",
+                    list.join(", ")
+                ),
+            },
         ));
     }
     findings
+}
+
+/// Whether what is asked for is safe, and in force for as long as a state is active.
+fn is_held(deployment: &Deployment, site: &RaiseSite, ask: Ask) -> bool {
+    site.scoped && matches!(ask, Ask::Apply(id) if deployment.configuration(id).is_some_and(|of| of.safe))
 }
 
 /// The state that is active until an answer comes, or nobody is told: who enters asks for himself; what an exit or an

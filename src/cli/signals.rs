@@ -1,12 +1,18 @@
-//! Ctrl-C, and being asked to end (SIGTERM, SIGHUP, SIGQUIT, SIGXCPU).
+//! Ctrl-C, and being asked to end (SIGTERM, SIGHUP, SIGQUIT, SIGXCPU, SIGPWR).
 
 use super::exit::Exit;
 use super::{last_words, output};
 use crate::limits;
 use crate::time::{Clock, Time};
+use libc::SIGPWR;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGTSTP, SIGXCPU};
 use signal_hook::iterator::{Handle, Signals};
 use std::thread::JoinHandle;
+
+/// Signals that ask a program for something that it offers (turn the log over, a timer, a profile): none of them is offered here, and
+/// what is not caught would end the process with all that it holds.
+const MEANT_FOR_OTHERS: [i32; 6] =
+    [libc::SIGUSR1, libc::SIGUSR2, libc::SIGALRM, libc::SIGVTALRM, libc::SIGPROF, libc::SIGIO];
 
 /// Watches for signals until dropped.
 pub struct SignalWatch {
@@ -45,7 +51,7 @@ impl SignalSeen {
     /// `held`: stopping stands still until somebody asks for force. Then one more asks for that, and for no end at once; the first one
     /// too, where something else had asked for the end.
     fn asks(&mut self, signal: i32, now: Time, held: bool) -> Asks {
-        let gone = matches!(signal, SIGHUP | SIGXCPU);
+        let gone = matches!(signal, SIGHUP | SIGXCPU | SIGPWR);
         let within = |of: Option<Time>, limit| of.is_some_and(|of| now.since(of) < limit);
         let same = match self.count {
             0 => false,
@@ -81,9 +87,10 @@ impl SignalWatch {
         held: impl Fn() -> bool + Send + 'static,
         leave: impl FnOnce() + Send + 'static,
     ) -> std::io::Result<Self> {
-        [libc::SIGTTOU, libc::SIGTTIN].into_iter().for_each(ignore);
+        [libc::SIGTTOU, libc::SIGTTIN].into_iter().chain(MEANT_FOR_OTHERS).for_each(ignore);
         warn_before_the_time_is_over();
-        let asking = [SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGXCPU].into_iter().filter(|signal| !is_ignored(*signal));
+        let asking =
+            [SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGXCPU, SIGPWR].into_iter().filter(|signal| !is_ignored(*signal));
         let mut signals = Signals::new(asking.chain([SIGTSTP]))?;
         let handle = signals.handle();
         let thread = std::thread::Builder::new().name("davit-signals".to_owned()).spawn(move || {

@@ -599,6 +599,12 @@ codes! {
          to a state that asks for a safe configuration on its entry; a transition from the outermost state in which actuators \
          exist serves for all states inside. Where no coordinator waits for the event at all, that is a warning even without an \
          actuator: it is probably a slip.";
+    COORD_SAFE_LEFT = "coord::safe_left", "an emergency is taken back without anybody having said so",
+        "A state takes a `safe` configuration back when it is left (it is its `config`, or its `exit` undoes it), and a transition leaves it by what \
+         comes by itself: an answer of that configuration, a time, or whatever comes next; and what is entered asks for nothing safe. When a part of an \
+         emergency stop fails (`stop.broken`), that undoes the part that was done: brakes open again, and nobody asked. Let an event of people lead on \
+         (`e_reset`). What should be shown or told of how it ended is a transition between two states inside of the one that has the \
+         configuration: that stays in force.";
     DEPLOY_NO_REST = "deploy::no_rest", "something moves, and nothing is named that brings it to rest by force",
         "When a deployment is taken down by force (the third stage of stopping, docs/operating.md), its safe configurations are applied and then \
          everything is removed: what stands only by its drives falls. `shutdown: { rest: [park] }` names configurations that bring it to rest before \

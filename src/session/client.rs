@@ -2,10 +2,10 @@
 
 use super::owner;
 use super::place::{self, Unreached, Untrusted};
-use super::rpc::RpcError;
+use super::rpc::{self, RpcError};
 use crate::limits;
 use crate::model::finding::did_you_mean;
-use crate::time::Clock;
+use crate::time::{Clock, Time};
 use serde_json::{Value as Json, json};
 use std::io::{self, BufRead, BufReader, Write};
 use std::os::unix::net::UnixStream;
@@ -69,6 +69,9 @@ pub struct Client {
     next: u64,
     /// A line whose end has not come.
     begun: Vec<u8>,
+    /// The last call, and until when it is made again where there is no place for it.
+    call: (String, Time),
+    clock: Clock,
 }
 
 impl Client {
@@ -92,7 +95,10 @@ impl Client {
         let clock = Clock::real();
         loop {
             match place::reach(&place::socket(&name)) {
-                Ok(stream) => return Ok(Self { name, reader: BufReader::new(stream), next: 1, begun: Vec::new() }),
+                Ok(stream) => {
+                    let (reader, call) = (BufReader::new(stream), (String::new(), Time(0)));
+                    return Ok(Self { name, reader, next: 1, begun: Vec::new(), call, clock });
+                }
                 Err(Unreached::Untrusted(why)) => return Err(why.into()),
                 Err(Unreached::Io(_)) => {}
             }
@@ -144,13 +150,30 @@ impl Client {
         let id = self.next;
         self.next += 1;
         let line = json!({"jsonrpc": "2.0", "id": id, "method": method, "params": params}).to_string();
+        self.call = (format!("{line}\n"), self.clock.now() + limits::SOCKET_SAY);
+        self.say()?;
+        Ok(id)
+    }
+
+    fn say(&mut self) -> Result<(), ClientError> {
         // One that was refused a place may be closed by now; what it was told is still there to be read.
-        match self.reader.get_mut().write_all(format!("{line}\n").as_bytes()) {
+        match self.reader.get_mut().write_all(self.call.0.as_bytes()) {
             Err(source) if source.kind() != io::ErrorKind::BrokenPipe => {
                 Err(ClientError::Io { name: self.name.clone(), source })
             }
-            _ => Ok(id),
+            _ => Ok(()),
         }
+    }
+
+    /// Makes the last call again after a moment: no place was left for it, so it was not heard. Whether there is time for that.
+    fn again(&mut self) -> Result<bool, ClientError> {
+        if self.clock.now() >= self.call.1 {
+            return Ok(false);
+        }
+        self.clock.sleep(limits::SOCKET_STEP);
+        let Ok(stream) = place::reach(&place::socket(&self.name)) else { return Ok(false) };
+        (self.reader, self.begun) = (BufReader::new(stream), Vec::new());
+        self.say().map(|()| true)
     }
 
     /// The answer to a call; none: it has not come within `limit`, and may yet.
@@ -160,11 +183,11 @@ impl Client {
     pub fn answer(&mut self, id: u64, limit: Duration) -> Result<Option<Json>, ClientError> {
         let name = self.name.clone();
         let io = |source| ClientError::Io { name: name.clone(), source };
-        let (clock, least) = (Clock::real(), Duration::from_micros(1));
-        let deadline = clock.now() + limit;
+        let least = Duration::from_micros(1);
+        let deadline = self.clock.now() + limit;
         loop {
             // What else comes meanwhile lengthens nothing. No time at all would be taken for all of it.
-            let left = deadline.since(clock.now()).max(least);
+            let left = deadline.since(self.clock.now()).max(least);
             self.reader.get_ref().set_read_timeout(Some(left)).map_err(io)?;
             let json = match self.read() {
                 Err(late) if matches!(late.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut) => {
@@ -182,6 +205,13 @@ impl Client {
             if let Some(error) = refused {
                 let error: RpcError =
                     serde_json::from_value(error.clone()).unwrap_or_else(|_| RpcError::new(0, error.to_string()));
+                // Whoever has the last places has them for a moment.
+                if !own && error.code == rpc::TOO_MANY && self.again()? {
+                    if self.clock.now() >= deadline {
+                        return Ok(None);
+                    }
+                    continue;
+                }
                 return Err(error.into());
             }
             return Ok(Some(json.get("result").cloned().unwrap_or(Json::Null)));

@@ -24,7 +24,8 @@ pub(super) struct Doors {
 struct InsideDoor {
     closed: bool,
     places: usize,
-    kept: usize,
+    /// The processes that have the kept ones.
+    kept: Vec<libc::pid_t>,
     connections: Vec<Weak<SocketConnection>>,
 }
 
@@ -34,13 +35,20 @@ type Waiting = (Arc<SocketConnection>, DoorPlace);
 /// A place, until it is dropped.
 struct DoorPlace {
     doors: Arc<Doors>,
-    kept: bool,
+    /// Whose it is, where it is a kept one.
+    kept: Option<libc::pid_t>,
 }
 
 impl Drop for DoorPlace {
     fn drop(&mut self) {
         let mut inside = lock(&self.doors.inside);
-        *(if self.kept { &mut inside.kept } else { &mut inside.places }) -= 1;
+        match self.kept {
+            None => inside.places -= 1,
+            Some(process) => {
+                let at = inside.kept.iter().position(|other| *other == process);
+                at.into_iter().for_each(|at| _ = inside.kept.swap_remove(at));
+            }
+        }
     }
 }
 
@@ -61,25 +69,26 @@ impl Doors {
         lock(&self.inside).closed
     }
 
-    /// A place, an ordinary one if there is one left.
-    fn place(self: &Arc<Self>, shared: &ServingShared) -> Option<DoorPlace> {
+    /// A place for that process, an ordinary one if there is one left.
+    fn place(self: &Arc<Self>, process: libc::pid_t, shared: &ServingShared) -> Option<DoorPlace> {
         let mut inside = lock(&self.inside);
-        let kept = inside.places >= shared.bounds.connections;
-        if kept && inside.kept >= shared.bounds.kept {
-            return None;
+        if inside.places >= shared.bounds.connections {
+            drop(inside);
+            return self.kept_place(process, shared);
         }
-        *(if kept { &mut inside.kept } else { &mut inside.places }) += 1;
-        Some(DoorPlace { doors: self.clone(), kept })
+        inside.places += 1;
+        Some(DoorPlace { doors: self.clone(), kept: None })
     }
 
     /// A place of those that are kept.
-    fn kept_place(self: &Arc<Self>, shared: &ServingShared) -> Option<DoorPlace> {
+    fn kept_place(self: &Arc<Self>, process: libc::pid_t, shared: &ServingShared) -> Option<DoorPlace> {
         let mut inside = lock(&self.inside);
-        if inside.kept >= shared.bounds.kept {
+        let own = inside.kept.iter().filter(|other| **other == process).count();
+        if inside.kept.len() >= shared.bounds.kept || own >= shared.bounds.kept_each {
             return None;
         }
-        inside.kept += 1;
-        Some(DoorPlace { doors: self.clone(), kept: true })
+        inside.kept.push(process);
+        Some(DoorPlace { doors: self.clone(), kept: Some(process) })
     }
 
     fn enter(&self, connection: &Arc<SocketConnection>) {
@@ -136,27 +145,27 @@ impl Doors {
         shared: &Arc<ServingShared>,
         waiting: &SyncSender<Waiting>,
     ) {
-        if !place::is_own(&stream) {
+        let Some(process) = place::peer(&stream) else {
             let why = "this socket is for the processes of its own user";
             return refuse(number, stream, shared, RpcError::new(rpc::REFUSED, why));
-        }
-        let Some(place) = self.place(shared) else { return refuse(number, stream, shared, too_many()) };
+        };
+        let Some(place) = self.place(process, shared) else { return refuse(number, stream, shared, too_many()) };
         let Ok(connection) = SocketConnection::new(number, stream, shared.bounds.write).map(Arc::new) else { return };
         self.enter(&connection);
         let may = {
             let inside = lock(&self.inside);
-            inside.places + inside.kept <= shared.bounds.threads
+            inside.places + inside.kept.len() <= shared.bounds.threads
         };
         let (serving, own) = (shared.clone(), connection.clone());
         let attended = move || {
-            attend(&own, &serving, place.kept);
+            attend(&own, &serving, place.kept.is_some());
             drop(place);
         };
         let thread = || std::thread::Builder::new().name("davit-client".to_owned()).spawn(attended);
         if may && thread().is_ok() {
             return;
         }
-        let place = self.kept_place(shared);
+        let place = self.kept_place(process, shared);
         if place.is_none_or(|place| waiting.try_send((connection.clone(), place)).is_err()) {
             let _ = connection.send(&rpc::answer(&Json::Null, Err(too_many())));
         }

@@ -89,6 +89,11 @@ pub fn reach(socket: &Path) -> Result<UnixStream, Unreached> {
 
 /// Whether the process at the other end is the user's own.
 pub fn is_own(stream: &UnixStream) -> bool {
+    peer(stream).is_some()
+}
+
+/// The process at the other end, where it is the user's own.
+pub fn peer(stream: &UnixStream) -> Option<libc::pid_t> {
     let mut peer = libc::ucred { pid: 0, uid: u32::MAX, gid: u32::MAX };
     let mut length = libc::socklen_t::try_from(size_of::<libc::ucred>()).unwrap_or_default();
     // SAFETY: the descriptor is open as long as `stream`, and there is room for `length` bytes at `peer`, which is plain numbers.
@@ -96,7 +101,7 @@ pub fn is_own(stream: &UnixStream) -> bool {
         let at = (&raw mut peer).cast();
         libc::getsockopt(stream.as_raw_fd(), libc::SOL_SOCKET, libc::SO_PEERCRED, at, &raw mut length)
     };
-    answer == 0 && peer.uid == user()
+    (answer == 0 && peer.uid == user()).then_some(peer.pid)
 }
 
 /// Makes the directory, for its owner alone.

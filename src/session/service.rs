@@ -352,7 +352,7 @@ fn answer_to(
     if !waits {
         return Ok(json!({ "request": request }));
     }
-    let late = || format!("`{what}` was not answered in time");
+    let late = || format!("`{what}` was not answered in time; it may be carried out yet");
     let answer: LoggedAnswer = wait(session, within, gone, late, |hub| hub.answer(request))?;
     Ok(view(&answer))
 }

@@ -41,6 +41,8 @@ pub struct Bounds {
     pub connections: usize,
     /// [`limits::SOCKET_KEPT`]
     pub kept: usize,
+    /// [`limits::SOCKET_KEPT_EACH`]
+    pub kept_each: usize,
     /// How many connections have a thread of their own; what must get through on another one is answered by a thread that there is
     /// from the beginning, one call after the other.
     pub threads: usize,
@@ -61,6 +63,7 @@ impl Default for Bounds {
         Self {
             connections: limits::SOCKET_CONNECTIONS,
             kept: limits::SOCKET_KEPT,
+            kept_each: limits::SOCKET_KEPT_EACH,
             threads: limits::SOCKET_CONNECTIONS + limits::SOCKET_KEPT,
             say: limits::SOCKET_SAY,
             idle: limits::SOCKET_IDLE,
@@ -137,11 +140,13 @@ pub(super) fn serve(connection: &Arc<SocketConnection>, shared: &ServingShared, 
                 return refuse(&Json::Null, RpcError::new(rpc::INVALID_REQUEST, "the line is too long"));
             }
             SaidTo::NotText => Err((Json::Null, RpcError::new(rpc::PARSE_ERROR, "the line is not UTF-8"))),
-            SaidTo::Line(line) if line.trim().is_empty() => continue,
+            SaidTo::Line(line) if line.trim().is_empty() && !kept => continue,
             SaidTo::Line(line) => rpc::parse(&line),
         };
         let call = match call {
             Ok(call) => call,
+            // One line is all that is heard on a kept place: who says nothing again and again must not keep it.
+            Err((id, error)) if kept => return refuse(&id, error),
             Err((id, error)) => {
                 refuse(&id, error)?;
                 continue;

@@ -121,10 +121,9 @@ impl HubState {
     /// Writes down one thing, and hands it to the taps: under the lock, so that all hear it in one order.
     fn write(&mut self, at: Time, what: Happening, is_report: bool) -> Arc<LogEntry> {
         let heard = match &what {
-            Happening::Event { event, .. }
-            | Happening::Emitted { event }
-            | Happening::Lost { event, .. }
-            | Happening::Stale { event } => Some(event.clone()),
+            Happening::Event { event, .. } | Happening::Emitted { event } | Happening::Lost { event, .. } => {
+                Some(event.clone())
+            }
             Happening::Answered(answered) => Some(answered.answer.clone()),
             Happening::State { active } => {
                 let of = active.first().and_then(|root| root.split_once(':')).map_or("", |(name, _)| name);

@@ -151,9 +151,8 @@ impl World {
     ) -> (FrameId, Verdict) {
         let broken = end.failed.is_some();
         if broken && !end.interrupts {
-            // What was done of it says nothing of what it was to take the place of, of the same: that is still so.
-            let same = |id: FrameId| self.stack.frame(id).is_some_and(|old| old.configuration == frame.configuration);
-            edits.pops.retain(|(id, _)| !same(*id));
+            // What was done of it undoes what was done, and no more: what it was to take the place of is taken over with what that undoes.
+            edits.pops.clear();
         }
         let frame = match end.failed {
             None if end.missed.is_empty() => frame,

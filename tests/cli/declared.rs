@@ -137,7 +137,7 @@ fn what_moves_and_what_settles_is_shown() {
     let text = demo.run(&[&["plan", "deployment.yaml"], &ids[..]].concat()).out;
     assert!(text.contains("exact, moves") && text.contains("source.burn() (moves)"), "{text}");
     let ty = demo.run(&["types", "deployment.yaml", "Source"]).out;
-    assert!(ty.contains("starting moves hardware"), "{ty}");
+    assert!(ty.contains("`start` moves hardware"), "{ty}");
     assert!(ty.contains("irreversible, moves hardware, settled by above(\"self.y\", 0.5)"), "{ty}");
     let ty = demo.run(&["types", "deployment.yaml", "Source", "--json"]).json();
     assert_eq!(ty["moves"], json!({ "start": true, "stop": false }));

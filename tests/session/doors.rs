@@ -87,7 +87,7 @@ fn rest(stream: &mut UnixStream) -> String {
 
 #[test]
 fn idle_connections_lock_nobody_out() {
-    let (name, socket, _) = open("places", Bounds { say: LIMIT, ..Bounds::default() });
+    let (name, socket, _) = open("places", Bounds { say: LIMIT, kept_each: 4, ..Bounds::default() });
     let connect = || UnixStream::connect(socket.path()).unwrap();
     let mut idle: Vec<UnixStream> = (0..Bounds::default().connections).map(|_| connect()).collect();
     // Each of them has its place.
@@ -104,16 +104,54 @@ fn idle_connections_lock_nobody_out() {
     assert_eq!((error.code, error.message.as_str()), (rpc::TOO_MANY, "too many connections"));
     // Also the kept places have an end; who finds none is told so, and does not hang.
     let kept: Vec<UnixStream> = (0..Bounds::default().kept).map(|_| connect()).collect();
-    let error = until("it is refused at once", || {
-        Client::connect(Some(&name)).unwrap().call("shutdown", &Json::Null, LIMIT).err()
-    });
-    assert_eq!(refused(Err(error)).code, rpc::TOO_MANY);
+    assert!(rest(&mut connect()).contains("too many connections"), "it is refused at once");
     drop((kept, client));
     until("a kept place is free again", || {
         Client::connect(Some(&name)).unwrap().call("shutdown", &Json::Null, LIMIT).ok()
     });
     drop(idle);
     until("places are free again", || Client::connect(Some(&name)).unwrap().call("stack", &Json::Null, LIMIT).ok());
+}
+
+/// One line is all that is heard on a kept place, one process has one of them, and who finds none tries again for a moment.
+#[test]
+fn who_keeps_coming_keeps_nobody_out() {
+    let (name, socket, _) = open("again", Bounds { connections: 1, say: LIMIT, ..Bounds::default() });
+    let connect = || UnixStream::connect(socket.path()).unwrap();
+    let hello = |stream: &mut UnixStream| {
+        say(stream, "hello");
+        let mut line = String::new();
+        BufReader::new(stream).read_line(&mut line).unwrap();
+        assert!(line.contains("hello"), "{line}");
+    };
+    let mut idle = connect();
+    hello(&mut idle);
+    for line in ["\n", "x\n", "{}\n"] {
+        let mut stream = connect();
+        stream.write_all(line.as_bytes()).unwrap();
+        assert!(!rest(&mut stream).is_empty(), "it is told why");
+        drop(stream);
+        // The place is free when its connection has ended.
+        until("the place is free again", || {
+            Client::connect(Some(&name)).unwrap().call("shutdown", &Json::Null, LIMIT).ok()
+        });
+    }
+    let silent = until("a kept place", || {
+        let silent = connect();
+        silent.set_read_timeout(Some(Duration::from_millis(20))).unwrap();
+        BufReader::new(&silent).read_line(&mut String::new()).is_err().then_some(silent)
+    });
+    assert!(rest(&mut connect()).contains("too many connections"), "one process has one of the four");
+    drop((silent, idle, socket));
+
+    let short = Bounds { connections: 1, say: Duration::from_millis(200), ..Bounds::default() };
+    let (name, socket, _) = open("again_later", short);
+    let connect = || UnixStream::connect(socket.path()).unwrap();
+    let mut idle = connect();
+    hello(&mut idle);
+    let _silent = connect();
+    let answer = Client::connect(Some(&name)).unwrap().call("shutdown", &Json::Null, LIMIT);
+    assert_eq!(answer.unwrap(), "shutdown", "who finds none tries again");
 }
 
 /// Where the system has no thread left, what must get through does: one after the other.

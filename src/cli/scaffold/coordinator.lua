@@ -14,7 +14,14 @@ return state {
     trans { src = "fast", tgt = "slowly", events = { "e_slower" } },
   },
   failed = state {},
-  stopped = state { config = "stop" },
+  -- However much of it could be done: it is in force until people say that it is over.
+  stopped = state {
+    config = "stop",
+    whole = state {},
+    in_part = state {},
+    trans { src = "initial", tgt = "whole" },
+    trans { src = "whole", tgt = "in_part", events = { "stop.failed", "stop.broken" } },
+  },
   down = state {
     stopping = state { entry = "run.undo" },
     removing = state { entry = "build.undo" },
@@ -32,7 +39,7 @@ return state {
   trans { src = "up", tgt = "stopped", events = { "e_stop" } },
   trans { src = "failed", tgt = "stopped", events = { "e_stop" } },
   trans { src = "stopped", tgt = "stopped", events = { "e_stop" } },
-  trans { src = "stopped", tgt = "failed", events = { "e_reset", "stop.failed", "stop.broken" } },
+  trans { src = "stopped", tgt = "failed", events = { "e_reset" } },
   trans { src = "up", tgt = "down", events = { "e_end" } },
   trans { src = "failed", tgt = "down", events = { "e_end" } },
   trans { src = "stopped", tgt = "down", events = { "e_end" } },

@@ -7,7 +7,10 @@ use crate::lang::print::fields::{list, quoted, text, texts, value as written};
 use crate::lang::print::{float, milliseconds, seconds};
 use crate::lang::tree::{Cx, Fields, Kind};
 use crate::model::monitor::{Condition, Sampling};
+use crate::model::names::NameError;
 use crate::model::{ComponentName, Direction, EventName, FaultKind, Ident, Origin, Tunable, TypeName, Value};
+use std::fmt::Display;
+use std::str::FromStr;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -136,10 +139,31 @@ macro_rules! named {
 
 named!(Ident, EventName, ComponentName, TypeName);
 
-impl WrittenValue for Vec<TypeName> {
+/// Names that are listed, each of them once.
+trait ListedName: FromStr<Err = NameError> + PartialEq + Display {}
+
+impl ListedName for Ident {}
+impl ListedName for TypeName {}
+impl ListedName for EventName {}
+
+impl<T: ListedName> WrittenValue for Vec<(T, Origin)> {
     fn read(fields: &mut Fields, cx: &mut Cx, key: &'static str) -> Option<Self> {
-        let all: Vec<(TypeName, Origin)> = names(cx, fields, key, &format!("`{key}`"));
-        Some(all.into_iter().map(|(name, _)| name).collect())
+        Some(names(cx, fields, key, &format!("`{key}`")))
+    }
+
+    fn goes_without_saying(&self, _row: &Key) -> bool {
+        self.is_empty()
+    }
+
+    fn text(&self, _row: &Key, pen: &mut Pen) -> String {
+        list(&texts(self.iter().map(|(name, _)| name), pen.language), pen.language)
+    }
+}
+
+impl<T: ListedName> WrittenValue for Vec<T> {
+    fn read(fields: &mut Fields, cx: &mut Cx, key: &'static str) -> Option<Self> {
+        let all: Option<Vec<(T, Origin)>> = WrittenValue::read(fields, cx, key);
+        all.map(|all| all.into_iter().map(|(name, _)| name).collect())
     }
 
     fn goes_without_saying(&self, _row: &Key) -> bool {

@@ -2,38 +2,10 @@
 
 use super::{LIMITS, Pen, WrittenValue};
 use crate::lang::grammar::{self, Key};
-use crate::lang::lower::{name, names, once};
+use crate::lang::lower::{name, once};
 use crate::lang::print::fields::{list, table, texts};
 use crate::lang::tree::{Cx, Fields, Kind};
-use crate::model::{ConfigId, DeploymentLimits, EventName, Ident, MemberRef, OperatorMay, Origin};
-
-/// Names of libraries.
-impl WrittenValue for Vec<Ident> {
-    fn read(fields: &mut Fields, cx: &mut Cx, key: &'static str) -> Option<Self> {
-        let all: Vec<(Ident, Origin)> = names(cx, fields, key, &format!("`{key}`"));
-        Some(all.into_iter().map(|(name, _)| name).collect())
-    }
-
-    // A deployment names libraries, or has types of its own; that it has none is said.
-    fn text(&self, _row: &Key, pen: &mut Pen) -> String {
-        list(&texts(self, pen.language), pen.language)
-    }
-}
-
-/// Events.
-impl WrittenValue for Vec<(EventName, Origin)> {
-    fn read(fields: &mut Fields, cx: &mut Cx, key: &'static str) -> Option<Self> {
-        Some(names(cx, fields, key, &format!("`{key}`")))
-    }
-
-    fn goes_without_saying(&self, _row: &Key) -> bool {
-        self.is_empty()
-    }
-
-    fn text(&self, _row: &Key, pen: &mut Pen) -> String {
-        list(&texts(self.iter().map(|(event, _)| event), pen.language), pen.language)
-    }
-}
+use crate::model::{ConfigId, DeploymentLimits, MemberRef, OperatorMay, Origin};
 
 /// Configurations, and properties and in-ports as `Component.member`.
 impl WrittenValue for Vec<(OperatorMay, Origin)> {

@@ -2,11 +2,11 @@
 
 use super::{Pen, WrittenValue};
 use crate::lang::grammar::{EFFECT, Key};
-use crate::lang::lower::{by_name, name, names, text as plain};
+use crate::lang::lower::{by_name, name, text as plain};
 use crate::lang::print::fields::{list, table, text, texts};
 use crate::lang::tree::{Cx, Entry, Fields, Kind, Node};
 use crate::model::finding::nearest;
-use crate::model::{Effect, EventName, Finding, Irreversible, Moves, Origin, Resource, ValueType, codes};
+use crate::model::{Effect, EventName, Finding, Irreversible, Moves, Resource, ValueType, codes};
 use std::collections::BTreeMap;
 
 /// A type: a text (`float`, `"float[3]"`), or a record as a map (`{x: float, y: float}`).
@@ -62,8 +62,8 @@ impl WrittenValue for Effect {
 /// The events that components of a type raise; what each tells is a library's to say.
 impl WrittenValue for BTreeMap<EventName, String> {
     fn read(fields: &mut Fields, cx: &mut Cx, key: &'static str) -> Option<Self> {
-        let raised: Vec<(EventName, Origin)> = names(cx, fields, key, &format!("`{key}`"));
-        Some(raised.into_iter().map(|(event, _)| (event, String::new())).collect())
+        let raised: Option<Vec<EventName>> = WrittenValue::read(fields, cx, key);
+        raised.map(|raised| raised.into_iter().map(|event| (event, String::new())).collect())
     }
 
     fn goes_without_saying(&self, _row: &Key) -> bool {

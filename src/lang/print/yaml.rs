@@ -219,8 +219,11 @@ pub fn deployment_yaml(
     };
     let mut out = format!("davit: 1\nname: {}\nplatform: {platform}\n", t(&d.name));
     let keys = bound::DEPLOYMENT.plain(d, Language::Yaml);
-    let (libraries, others) = keys.split_at(1);
+    let (libraries, others) = keys.split_at(usize::from(!d.libraries.is_empty()));
     fields::lines(&mut out, "", libraries, Language::Yaml);
+    if d.libraries.is_empty() && d.types.is_empty() {
+        out.push_str("libraries: []\n");
+    }
     if !d.types.is_empty() {
         out.push_str("types:\n");
         d.types.iter().for_each(|ty| component_type(&mut out, ty));

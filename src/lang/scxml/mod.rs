@@ -5,6 +5,7 @@
 //! nesting, a bounded number of nodes, and the size of any file.
 
 mod content;
+mod contradicted;
 mod meaning;
 mod places;
 mod strange;
@@ -298,6 +299,7 @@ impl<'t> ScxmlReader<'_, 't> {
         }
         read.sort_by_key(|(place, _)| *place);
         let mut list: Vec<ChartTransition> = read.into_iter().map(|(_, transition)| transition).collect();
+        self.times_agree(element, &full, &list);
         self.in_document_order(&mut list);
         state.transitions.extend(list);
         if own(element, "doo").is_some() {

@@ -70,7 +70,7 @@ impl<'t> ScxmlReader<'_, 't> {
         }
     }
 
-    /// The same for what is written beside SCXML by this program.
+    /// Misspelt attributes: of SCXML, and of what is written beside it by this program.
     pub(super) fn misspelt(&mut self, root: Element<'_, 't>) {
         for element in root.descendants().filter(Element::is_element) {
             let own = element.attributes().filter(|attribute| attribute.namespace() == Some(OURS));
@@ -78,6 +78,9 @@ impl<'t> ScxmlReader<'_, 't> {
                 let (key, help) = (attribute.name(), did_you_mean(attribute.name(), "attributes", OWN.iter().copied()));
                 let (origin, message) = (self.at_name(attribute), format!("there is no attribute `davit:{key}`"));
                 self.cx.report(Finding::error(codes::TEXT_UNKNOWN_KEY, message).at(origin).help(help));
+            }
+            if element.tag_name().namespace() == Some(SCXML) {
+                self.unknown(element);
             }
             if element.tag_name().namespace() == Some(OURS) {
                 let message = format!("there is no element `davit:{}`", element.tag_name().name());
@@ -151,8 +154,8 @@ impl<'t> ScxmlReader<'_, 't> {
         }
     }
 
-    fn attributes(&mut self, element: Element<'_, 't>) {
-        self.forbidden(element);
+    /// Attributes that SCXML does not have, or that mean nothing here.
+    fn unknown(&mut self, element: Element<'_, 't>) {
         let name = element.tag_name().name();
         let Some((_, known)) = ATTRIBUTES.iter().find(|(of, _)| *of == name) else { return };
         for attribute in element.attributes().filter(|attribute| attribute.namespace().is_none()) {
@@ -160,11 +163,19 @@ impl<'t> ScxmlReader<'_, 't> {
             if let Some((.., help)) = NONE.iter().find(|(of, none, _)| (*of, *none) == (name, key)) {
                 self.no_counterpart(element, format!("`{key}` of `{name}` has no counterpart here"), help);
             } else if !known.contains(&key) {
-                let help = did_you_mean(key, "attributes", known.iter().copied());
+                let help = match OWN.contains(&key) {
+                    true => format!("did you mean `davit:{key}`?"),
+                    false => did_you_mean(key, "attributes", known.iter().copied()),
+                };
                 let (origin, message) = (self.at_name(attribute), format!("`{name}` has no attribute `{key}`"));
                 self.cx.report(Finding::error(codes::TEXT_UNKNOWN_KEY, message).at(origin).help(help));
             }
         }
+    }
+
+    fn attributes(&mut self, element: Element<'_, 't>) {
+        self.forbidden(element);
+        let name = element.tag_name().name();
         let kind =
             element.attribute("type").filter(|kind| name == "transition" && !["internal", "external"].contains(kind));
         if let Some(kind) = kind {

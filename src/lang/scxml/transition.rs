@@ -112,6 +112,7 @@ impl<'t> ScxmlReader<'_, 't> {
             }
             out.events.clear();
         }
+        self.events_agree(element, fqn, &out);
         if let Some(pn) = own(element, "pn") {
             out.pn = pn.parse().ok().filter(|pn: &f64| pn.is_finite()).unwrap_or_default();
         }

@@ -16,6 +16,8 @@
 
 mod transitions;
 
+pub use transitions::event_name;
+
 use crate::model::Origin;
 use crate::model::outline::{Outline, OutlineTransition};
 use crate::model::statechart::{Action, FunctionId, INITIAL, Since, Statechart, Trigger};

@@ -33,6 +33,16 @@ pub fn entered_from_inside(outline: &Outline<'_>) -> BTreeSet<usize> {
     outline.links.iter().filter_map(within).collect()
 }
 
+/// The event of a trigger of a state, by its whole name.
+pub fn event_name(trigger: &Trigger, fqn: &str) -> Option<String> {
+    match trigger {
+        Trigger::Event(name) if name.as_str() == "e_done" => Some(format!("e_done@{fqn}")),
+        Trigger::Event(name) => Some(name.to_string()),
+        Trigger::Timed(timed) => Some(timed.event_of(fqn)),
+        Trigger::Predicate(_) => None,
+    }
+}
+
 /// What starts a transition: events by their plain names and as written, and a condition that only functions can decide.
 struct Start {
     plain: Vec<String>,
@@ -84,15 +94,10 @@ impl ScxmlWriter<'_> {
         let start = || Start { plain: Vec::new(), written: Vec::new(), calls: guard.iter().cloned().collect() };
         let (mut named, mut predicates): (Start, Vec<FunctionId>) = (start(), Vec::new());
         for (trigger, _) in &transition.events {
-            let name = match trigger {
-                Trigger::Event(name) if name.as_str() == "e_done" => format!("e_done@{fqn}"),
-                Trigger::Event(name) => name.to_string(),
-                Trigger::Timed(timed) => timed.event_of(fqn),
-                Trigger::Predicate(id) => {
-                    predicates.push(*id);
-                    continue;
-                }
-            };
+            if let Trigger::Predicate(id) = trigger {
+                predicates.push(*id);
+            }
+            let Some(name) = event_name(trigger, fqn) else { continue };
             named.plain.push(plain_event(&name));
             named.written.push(trigger.to_string());
         }
