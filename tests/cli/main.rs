@@ -13,6 +13,7 @@ mod crowded;
 mod declared;
 mod demo;
 mod drawn;
+mod emergency;
 mod endless;
 mod endurance;
 mod explored;

@@ -33,10 +33,13 @@ fn deploy(demo: &Demo, out: &str) -> Foreground {
 
 #[test]
 fn every_signal_that_asks_for_the_end_is_led_down() {
-    for signal in [libc::SIGINT, libc::SIGTERM, libc::SIGHUP, libc::SIGQUIT] {
+    for signal in [libc::SIGINT, libc::SIGTERM, libc::SIGHUP, libc::SIGQUIT, libc::SIGPWR] {
         let demo = Demo::new();
         let deployed = deploy(&demo, "out");
         demo.until_phase("up");
+        // What asks for something that is not offered ends nothing.
+        [libc::SIGUSR1, libc::SIGUSR2, libc::SIGALRM, libc::SIGPROF].iter().for_each(|other| deployed.signal(*other));
+        assert_eq!(demo.run(&["status"]).code, 0);
         deployed.signal(signal);
         assert_eq!(deployed.end().code(), Some(0), "{signal}");
         assert!(demo.read("out").contains("demo down, nothing is left"), "{}", demo.read("out"));
@@ -69,6 +72,33 @@ fn what_its_coordinator_does_not_do_is_told_by_the_exit_status() {
     assert_eq!(deployed.end().code(), Some(4));
     assert!(demo.read("out").contains("without its coordinator, nothing is left"), "{}", demo.read("out"));
 }
+
+/// Also of a bring-up that broke and was made whole by an answer that was late: its coordinator has not led down.
+#[test]
+fn a_bring_up_that_was_made_whole_meanwhile_has_not_been_led_down() {
+    let demo = Demo::new();
+    demo.write("late.yaml", LATE);
+    let shipped = |name: &str| std::fs::read_to_string(format!("{}/configs/hello/{name}.lua", env!("CARGO_MANIFEST_DIR")));
+    for name in ["configurations", "coordinator"] {
+        demo.write(&format!("{name}.lua"), &shipped(name).unwrap());
+    }
+    let ran = demo.run(&["deploy", "late.yaml", "--clock", "simulated", "--pace", "0"]);
+    assert!(ran.out.contains("stopping  without its coordinator"), "{}{}", ran.out, ran.err);
+    assert_eq!(ran.code, 4, "{}{}", ran.out, ran.err);
+}
+
+/// The gentlest example, with a connection that takes longer than a step may.
+const LATE: &str = "davit: 1
+name: late
+platform: simulated
+libraries: [standard]
+activities: { loop: { period_ms: 10.0 } }
+configurations: [configurations.lua]
+coordinator: coordinator.lua
+deploy:   { event: e_start, up: operational, failed: [failed], within_s: 5 }
+shutdown: { event: e_stop,  down: idle, within_s: 5 }
+faults: [{ step: \"connect gain.y -> limit.u\", how: slow, times: 1, takes_s: 1.5 }]
+";
 
 /// A second signal does not wait for the coordinator, and neither does `--force`; meanwhile nobody changes anything.
 #[test]

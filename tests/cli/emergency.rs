@@ -1,0 +1,103 @@
+//! An emergency: what is left of one that failed in part, who lets go of it, and what `check` says of that.
+
+use crate::demo::Demo;
+use serde_json::Value as Json;
+
+/// What `davit new` writes, in YAML.
+fn belt() -> Demo {
+    let demo = Demo::new();
+    let new = demo.run(&["new", "belt"]);
+    assert_eq!(new.code, 0, "{}{}", new.out, new.err);
+    demo
+}
+
+/// What a script says of it, on the simulated clock.
+fn said(demo: &Demo, script: &str) -> Vec<String> {
+    demo.write("belt/own.lua", script);
+    let ran = demo.run(&["run", "belt/own.lua", "--clock", "simulated", "--quiet"]);
+    assert_eq!(ran.code, 0, "{}{}", ran.out, ran.err);
+    ran.out.lines().map(str::to_owned).collect()
+}
+
+/// Errors and warnings of `check` with that code.
+fn found(demo: &Demo, code: &str) -> Vec<Json> {
+    let told = demo.run(&["check", "belt/deployment.yaml", "--json"]).json();
+    let all = told["findings"].as_array().unwrap().iter();
+    all.filter(|one| one["code"] == code && one["severity"] != "info").cloned().collect()
+}
+
+/// The brake fails, or the speed is not written: what was done stays until people say otherwise, and then nothing says 0.4 any more.
+#[test]
+fn one_that_fails_in_part_stays_and_is_undone_to_what_is_in_force() {
+    let story = |fault: &str| {
+        format!(
+            "deploy('deployment.yaml') raise('e_faster') wait_answer('fast.ok', 1)
+             fault('{fault}', 'fail') raise('e_stop') wait(5)
+             wait_state('stopped.in_part', 0) say('stopped ' .. tostring(port('motor.speed')))
+             raise('e_reset') wait_state('failed', 1) wait(1) say('reset ' .. tostring(port('motor.speed')))
+             shutdown()"
+        )
+    };
+    let demo = belt();
+    assert_eq!(said(&demo, &story("operation_call motor.brake")), ["stopped 0.0", "reset nil"]);
+    assert_eq!(said(&demo, &story("port_write motor.speed = 0.0")), ["stopped 0.4", "reset nil"]);
+    // Also where its coordinator lets go of it at once.
+    demo.replace("belt/coordinator.yaml", "events: [e_reset]", "events: [e_reset, stop.failed, stop.broken]");
+    let at_once = story("operation_call motor.brake").replace("wait_state('stopped.in_part', 0)", "wait_state('failed', 0)");
+    assert_eq!(said(&demo, &at_once), ["stopped nil", "reset nil"]);
+}
+
+#[test]
+fn who_lets_go_of_one_unasked_is_told() {
+    let lets_go = |from: &str, to: &str| {
+        let demo = belt();
+        assert_eq!(found(&demo, "coord::safe_left"), [Json::Null; 0]);
+        demo.replace("belt/coordinator.yaml", from, to);
+        found(&demo, "coord::safe_left").into_iter().map(|one| one["message"].as_str().unwrap().to_owned()).collect::<Vec<_>>()
+    };
+    let reset = "{ src: stopped, tgt: failed, events: [e_reset] }";
+    for (by, told) in [
+        ("events: [e_reset, stop.failed]", "`stop.failed` leads from `root.stopped` to `root.failed`"),
+        ("events: [e_reset, stop.ok]", "`stop.ok` leads from"),
+        ("events: [e_after(5)]", "`e_after(5)"),
+        ("pn: -1", "whatever comes next leads from"),
+    ] {
+        let told_of = lets_go(reset, &format!("{{ src: stopped, tgt: failed, {by} }}"));
+        assert!(told_of.len() == 1 && told_of[0].contains(told) && told_of[0].contains("takes `stop` back"), "{told_of:?}");
+    }
+    // From inside as well; and not where what is entered asks for what is safe.
+    let inside = lets_go(reset, "{ src: stopped.in_part, tgt: failed, events: [stop.broken] }");
+    assert_eq!(inside.len(), 1, "{inside:?}");
+    let anew = lets_go("{ src: stopped, tgt: stopped, events: [e_stop] }", "{ src: stopped, tgt: stopped, events: [e_stop, e_after(5)] }");
+    assert!(anew.is_empty(), "{anew:?}");
+    // The help of a failure that nobody hears does not lead there.
+    let demo = belt();
+    demo.replace("belt/coordinator.yaml", "events: [stop.failed, stop.broken]", "events: [e_looked]");
+    let unheard = found(&demo, "coord::failure_unhandled");
+    assert!(unheard[0]["help"].as_str().unwrap().contains("between two states inside of this one"), "{unheard:?}");
+}
+
+#[test]
+fn what_moves_and_has_none_is_told() {
+    let demo = belt();
+    demo.replace("belt/deployment.yaml", "safety: [e_stop]", "");
+    let told = found(&demo, "coord::safety_unheard");
+    assert!(told[0]["message"].as_str().unwrap().contains("no event is named under `safety`"), "{told:?}");
+}
+
+/// Without a group each is one more; its undo is no way round.
+#[test]
+fn one_of_no_group_is_given_one() {
+    let demo = belt();
+    demo.replace("belt/configurations.yaml", "safe: true\n    group: speed", "safe: true");
+    let told = found(&demo, "coord::stack_grows");
+    assert!(!told.is_empty() && told.iter().all(|one| one["help"].as_str().unwrap().contains("a group")), "{told:?}");
+}
+
+/// A second one is answered by its own answer.
+#[test]
+fn a_second_one_is_not_answered_by_the_first() {
+    let twice = "raise('e_stop') wait_answer('stop.ok', 2) say(now())";
+    let script = format!("deploy('deployment.yaml') fault('operation_call motor.brake', 'slow', 5, 0.5) {twice} {twice} shutdown()");
+    assert_eq!(said(&belt(), &script), ["0.5", "1.0"]);
+}
