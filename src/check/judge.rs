@@ -28,6 +28,7 @@ impl Graph<'_, '_> {
     pub fn judge(&mut self) -> Traced {
         let mut found = Traced::new();
         self.refusals(&mut found);
+        self.withheld(&mut found);
         self.hollow(&mut found);
         self.growing(&mut found);
         self.unhandled(&mut found);
@@ -311,7 +312,7 @@ impl Graph<'_, '_> {
     }
 
     /// The place that made a request, as far as it can be told.
-    fn site(&self, number: usize, request: &Request) -> Option<&RaiseSite> {
+    pub(super) fn site(&self, number: usize, request: &Request) -> Option<&RaiseSite> {
         let name = request.ask.to_string();
         let chart = self.product.members[number].chart;
         let owner = request.tag.0.checked_sub(1).and_then(|at| chart.node(usize::try_from(at).ok()?));

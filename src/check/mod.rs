@@ -114,6 +114,7 @@ mod verdict;
 mod way;
 mod ways;
 mod when;
+mod withheld;
 mod world;
 
 #[cfg(any(test, feature = "internals"))]
