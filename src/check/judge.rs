@@ -93,6 +93,7 @@ impl Graph<'_, '_> {
                 let within = self.runs_out(at, &request).unwrap_or_default().max(limits::REPLAY_STEP * 2);
                 last.replay.then = Some((request.ask.failed().event(request.ask), within));
             }
+            let finding = self.with_what_was_asked_twice(finding, at, &request, &trace);
             // The reasons are findings of their own, each at its place.
             let number = self.product.member(request.requester);
             let made = number.is_some_and(|n| self.maker(n, &self.states[at as usize], request.ask).is_some());

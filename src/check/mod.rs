@@ -8,6 +8,7 @@ mod alike;
 mod alone;
 mod arrive;
 mod aside;
+mod asked_twice;
 mod automaton;
 mod automaton_draft;
 mod bars;

@@ -68,6 +68,14 @@ pub struct Barring {
 }
 
 impl World {
+    /// The configuration whose frame, asked for by the same one, is in the way of the undo of that one's newest frame of `id`; none: there is none.
+    pub fn own_in_the_way(&self, id: ConfigId, by: Requester) -> Option<ConfigId> {
+        let frames = self.stack.frames();
+        let at = frames.iter().rposition(|frame| (frame.configuration, frame.requester) == (id, by))?;
+        let above = share::look(frames, at).err()?.by?;
+        self.stack.frame(above).filter(|above| above.requester == by).map(|above| above.configuration)
+    }
+
     /// What the newest frame of a configuration that one has asked for is in the way of, where that moves when it is undone; none: it does not,
     /// or is in the way of nothing.
     pub fn barring(&self, id: ConfigId, by: Requester) -> Option<Barring> {
