@@ -2,7 +2,7 @@
 //! asked for there.
 
 use super::explore::Graph;
-use super::trace::TraceStep;
+use super::trace::{Happened, TraceStep};
 use crate::model::{Ask, ConfigId, Finding, Verdict};
 use crate::stack::Request;
 
@@ -34,13 +34,20 @@ impl Graph<'_, '_> {
     }
 }
 
-/// Whether the last that was told of a configuration on a way is that it was undone.
+/// Whether what is in force of a configuration at the end of a way was there, or asked for, when it was undone last.
 fn was_undone(id: ConfigId, way: &[TraceStep]) -> bool {
-    let last = |ask: Ask, verdict: Verdict| {
-        let event = verdict.event(ask);
-        let told = way.iter().flat_map(TraceStep::answers).enumerate();
-        told.filter(|(_, told)| *told == event.as_str()).map(|(at, _)| at).last()
-    };
-    let applied = last(Ask::Apply(id), Verdict::Ok);
-    applied.is_some() && last(Ask::UndoOf(id), Verdict::Undone) > applied
+    let (ok, undone) = (Verdict::Ok.event(Ask::Apply(id)), Verdict::Undone.event(Ask::UndoOf(id)));
+    let (mut since, mut comes) = (false, false);
+    for step in way {
+        // An event may have had it asked for anew; else what is told behind the undo was asked for before it.
+        comes &= !matches!(step.what, Happened::Event { .. });
+        for told in step.answers() {
+            if told == undone.as_str() {
+                (since, comes) = (true, true);
+            } else if told == ok.as_str() {
+                since &= comes;
+            }
+        }
+    }
+    since
 }
