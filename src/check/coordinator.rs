@@ -282,13 +282,21 @@ fn heard(deployment: &Deployment, chart: &Chart, known: &KnownEvents<'_>, findin
     }
 }
 
-/// Which answer to what is asked for may have been meant, where what stands behind that is none.
+/// Which answer to what is asked for, or to its undo, may have been meant, where what stands behind that is none.
 fn answer_meant(deployment: &Deployment, asked: &str, rest: &str) -> String {
     let ask = EventName::new(asked).ok().and_then(|name| ask_of(deployment, name));
-    let answers: Vec<String> = ask.into_iter().flat_map(|ask| answers_to(ask).map(|event| event.to_string())).collect();
+    let undo = ask.and_then(|ask| if let Ask::Apply(id) = ask { Some(Ask::UndoOf(id)) } else { None });
+    let answers: Vec<String> =
+        ask.into_iter().chain(undo).flat_map(|ask| answers_to(ask).map(|event| event.to_string())).collect();
     let whole = format!("{asked}.{}", rest.trim_start_matches('.'));
+    // An undo is no `ok`, but it is what it would be called.
+    let done = whole.strip_suffix(".undo.ok").or_else(|| whole.strip_suffix(".undo.done"));
+    let undone = done.map(|of| format!("{of}{}", Verdict::Undone.ending(false)));
     match nearest(&whole, answers.iter().map(String::as_str)) {
         _ if answers.contains(&whole) => format!("did you mean `{whole}`?"),
+        _ if undone.as_ref().is_some_and(|undone| answers.contains(undone)) => {
+            format!("did you mean `{}`?", undone.unwrap_or_default())
+        }
         Some(near) => format!("did you mean `{near}`?"),
         None => did_you_mean(&whole, "answers", answers.iter().map(String::as_str)),
     }

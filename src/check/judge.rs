@@ -28,6 +28,7 @@ impl Graph<'_, '_> {
     pub fn judge(&mut self) -> Traced {
         let mut found = Traced::new();
         self.refusals(&mut found);
+        self.withheld(&mut found);
         self.hollow(&mut found);
         self.growing(&mut found);
         self.unhandled(&mut found);
@@ -92,6 +93,7 @@ impl Graph<'_, '_> {
                 let within = self.runs_out(at, &request).unwrap_or_default().max(limits::REPLAY_STEP * 2);
                 last.replay.then = Some((request.ask.failed().event(request.ask), within));
             }
+            let finding = self.with_what_was_asked_twice(finding, at, &request, &trace);
             // The reasons are findings of their own, each at its place.
             let number = self.product.member(request.requester);
             let made = number.is_some_and(|n| self.maker(n, &self.states[at as usize], request.ask).is_some());
@@ -311,7 +313,7 @@ impl Graph<'_, '_> {
     }
 
     /// The place that made a request, as far as it can be told.
-    fn site(&self, number: usize, request: &Request) -> Option<&RaiseSite> {
+    pub(super) fn site(&self, number: usize, request: &Request) -> Option<&RaiseSite> {
         let name = request.ask.to_string();
         let chart = self.product.members[number].chart;
         let owner = request.tag.0.checked_sub(1).and_then(|at| chart.node(usize::try_from(at).ok()?));

@@ -8,6 +8,7 @@ mod alike;
 mod alone;
 mod arrive;
 mod aside;
+mod asked_twice;
 mod automaton;
 mod automaton_draft;
 mod bars;
@@ -115,6 +116,7 @@ mod verdict;
 mod way;
 mod ways;
 mod when;
+mod withheld;
 mod world;
 
 #[cfg(any(test, feature = "internals"))]

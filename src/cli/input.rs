@@ -4,6 +4,7 @@
 use super::budget::Following;
 use super::exit::Exit;
 use super::inside::Inside;
+use super::signals::NothingBegan;
 use super::{CommandContext, CommandFailure};
 use crate::app::{self, Checked, Read, Refused};
 use crate::diagnostics::SourceMap;
@@ -78,6 +79,7 @@ impl CommandInput {
     pub fn check(&self, context: &CommandContext, silent: bool) -> Result<Checked, CommandFailure> {
         let read = self.read(context)?;
         let following = Following::before_acting(silent);
+        let _nothing = NothingBegan::watch();
         let goes_on = |far| {
             following.tell(far);
             Ok(())

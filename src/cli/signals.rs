@@ -158,6 +158,56 @@ fn ignore(signal: i32) {
     unsafe { libc::signal(signal, libc::SIG_IGN) };
 }
 
+/// What is said to Ctrl-C before anything has begun, on a terminal over the line that tells how far it is.
+const NOTHING_BEGAN: &str = "interrupted while it was being checked: nothing was begun\n";
+const OVER_THE_LINE: &str = "\r\x1b[2K";
+
+/// While it is there, Ctrl-C says that nothing was begun, and ends the process as it would by itself.
+pub struct NothingBegan {
+    here: bool,
+}
+
+impl NothingBegan {
+    /// From now on; where Ctrl-C is ignored, or somebody watches for it, that stays.
+    pub fn watch() -> Self {
+        let says: extern "C" fn(libc::c_int) = says_that_nothing_began;
+        // SAFETY: the handler calls nothing but what a handler may call, and what was there is put back.
+        let before = unsafe { libc::signal(SIGINT, says as libc::sighandler_t) };
+        let here = before == libc::SIG_DFL;
+        if !here {
+            // SAFETY: it is what was there.
+            unsafe { libc::signal(SIGINT, before) };
+        }
+        Self { here }
+    }
+}
+
+impl Drop for NothingBegan {
+    fn drop(&mut self) {
+        if self.here {
+            // SAFETY: it is what was there.
+            unsafe { libc::signal(SIGINT, libc::SIG_DFL) };
+        }
+    }
+}
+
+/// Writes, and lets the signal do what it does by itself.
+extern "C" fn says_that_nothing_began(signal: libc::c_int) {
+    let say = |text: &str| {
+        // SAFETY: `text` is as long as it says; a handler may write.
+        unsafe { libc::write(libc::STDERR_FILENO, text.as_ptr().cast(), text.len()) };
+    };
+    // SAFETY: a handler may ask for that, change what the signal does, and raise it.
+    unsafe {
+        if libc::isatty(libc::STDERR_FILENO) == 1 {
+            say(OVER_THE_LINE);
+        }
+        say(NOTHING_BEGAN);
+        libc::signal(signal, libc::SIG_DFL);
+        libc::raise(signal);
+    }
+}
+
 /// Whether whoever has started this process had it ignore a signal.
 fn is_ignored(signal: i32) -> bool {
     let mut action = std::mem::MaybeUninit::<libc::sigaction>::zeroed();

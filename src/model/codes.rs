@@ -585,7 +585,9 @@ codes! {
          configuration that does not fit the system as it is then: a component is there already or not there, a port is \
          driven, a property cannot be set in this run state. The request would be answered `failed`. Make the request \
          where it fits, or write the configuration so that it fits both states: demands (run states, values) are fulfilled \
-         when already so, acts (create, destroy, connect, disconnect) are not.";
+         when already so, acts (create, destroy, connect, disconnect) are not. What moves and is interrupted by something \
+         safe is not taken back unasked, and stands in the way of what lies below it: ask for its undo by its name before \
+         theirs, on every way down; where nothing of it is left, that is answered as done.";
     COORD_ENDLESS = "coord::endless", "answers go round for ever",
         "On the way shown the coordinator gets to a circle of states that only answers lead round: each answer makes it ask \
          for something whose answer makes it ask again. No step fails and no time passes on the way round, so it works \

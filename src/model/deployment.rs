@@ -316,7 +316,8 @@ impl Deployment {
         match Verdict::split(event) {
             // `park.udno.failed`: no name of a configuration, and one begins it.
             Some((subject, _)) => {
-                ConfigId::new(subject).is_ok() || subject.split_once('.').is_some_and(|(id, _)| is_one(id))
+                let of = subject.strip_suffix(UNDO).unwrap_or(subject);
+                ConfigId::new(of).is_ok() || subject.split_once('.').is_some_and(|(id, _)| is_one(id))
             }
             None => event.rsplit_once('.').is_some_and(|(subject, _)| {
                 let subject = subject.strip_suffix(UNDO).unwrap_or(subject);

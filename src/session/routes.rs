@@ -375,8 +375,7 @@ pub(super) fn on_progress(hub: &Hub, junction: &Junction, steps: &Steps, progres
         Progress::Stuck(why) => hub.note(Happening::Noted { note: why.clone() }),
         Progress::Lost { configuration, reason } => {
             let event = Verdict::Lost.event(Ask::Apply(*configuration));
-            let reasons = reason.findings().into_iter().map(|finding| finding.message).collect();
-            hub.note(Happening::Lost { event: event.to_string(), reasons });
+            hub.note(Happening::Lost { event: event.to_string(), reasons: reason.told() });
             // In whatever state they are: it answers nothing that was asked there.
             let path = junction.subsystems().and_then(|subsystems| subsystems.path_of(event));
             junction.give_to(hub, path, Incoming::new(Class::Notice, event));
@@ -403,12 +402,7 @@ pub(super) fn on_answer(hub: &Hub, junction: &Junction, steps: &Steps, answer: &
 
 fn give(hub: &Hub, junction: &Junction, answer: &Answer, steps: Vec<StepTime>, class: Class) {
     let event = answer.event();
-    let mut reasons: Vec<String> = answer.findings().iter().map(|finding| finding.message.clone()).collect();
-    // What is broken is told with its cause, which is a finding of its own beside it.
-    let causes = reasons.clone();
-    reasons.retain(|one| {
-        !causes.iter().any(|whole| whole.strip_prefix(one.as_str()).is_some_and(|rest| rest.starts_with("; ")))
-    });
+    let reasons = answer.reason.as_ref().map(|reason| reason.told()).unwrap_or_default();
     hub.answered(LoggedAnswer {
         request: answer.request.id.0,
         ask: answer.request.ask.to_string(),

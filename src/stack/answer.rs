@@ -231,6 +231,22 @@ impl Reason {
         }
     }
 
+    /// As it is told, a line each. What is broken is told with its cause, which is a finding of its own beside it; and what made one broken
+    /// may have made another one so that counted on it.
+    pub fn told(&self) -> Vec<String> {
+        let all: Vec<String> = self.findings().into_iter().map(|finding| finding.message).collect();
+        let is_part = |one: &String| {
+            all.iter().any(|whole| whole.strip_prefix(one.as_str()).is_some_and(|rest| rest.starts_with("; ")))
+        };
+        let mut told: Vec<String> = Vec::new();
+        for one in all.iter().filter(|one| !is_part(one)) {
+            if !told.contains(one) {
+                told.push(one.clone());
+            }
+        }
+        told
+    }
+
     fn single(&self) -> Finding {
         match self {
             Self::Unknown(id) => Finding::error(codes::UNKNOWN_REQUEST, self.to_string())

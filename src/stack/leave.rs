@@ -12,7 +12,7 @@ use super::request::{Batch, LedDown, Request, Requester, Why};
 use super::share::{self, Hindrance};
 use super::{Frame, FrameId, Inverse, Stack, World};
 use crate::model::names::is_within;
-use crate::model::{ComponentName, Finding};
+use crate::model::{Ask, ComponentName, ConfigId, Finding};
 use crate::plan::PlannedStep;
 use crate::plan::undo::DraftStep;
 use crate::system::touch::{Slot, slot};
@@ -55,6 +55,41 @@ impl Stack {
             along.get_or_insert_with(Claim::default).join(&frame);
         }
         along
+    }
+}
+
+/// What a frame that moves when it is undone is in the way of.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Barring {
+    /// What moves.
+    pub moves: String,
+    /// Of who asked for it, what is not undone before it, and why.
+    pub of: Vec<(ConfigId, String)>,
+}
+
+impl World {
+    /// The configuration whose frame, asked for by the same one, is in the way of the undo of that one's newest frame of `id`; none: there is none.
+    pub fn own_in_the_way(&self, id: ConfigId, by: Requester) -> Option<ConfigId> {
+        let frames = self.stack.frames();
+        let at = frames.iter().rposition(|frame| (frame.configuration, frame.requester) == (id, by))?;
+        let above = share::look(frames, at).err()?.by?;
+        self.stack.frame(above).filter(|above| above.requester == by).map(|above| above.configuration)
+    }
+
+    /// What the newest frame of a configuration that one has asked for is in the way of, where that moves when it is undone; none: it does not,
+    /// or is in the way of nothing.
+    pub fn barring(&self, id: ConfigId, by: Requester) -> Option<Barring> {
+        let frames = self.stack.frames();
+        let own = |frame: &&Arc<Frame>| frame.requester == by;
+        let frame = frames.iter().rev().filter(own).find(|frame| frame.configuration == id && !frame.safe)?;
+        let moves = moving(frame, frames, &self.system)?;
+        let others = frames.iter().filter(own).filter(|other| other.configuration != id && other.id < frame.id);
+        let bars = |other: &Arc<Frame>| {
+            let hindrance = share::look(&[other.clone(), frame.clone()], 0).err()?;
+            Some((other.configuration, hindrance.finding.message))
+        };
+        let of: Vec<(ConfigId, String)> = others.filter_map(bars).collect();
+        (!of.is_empty()).then_some(Barring { moves, of })
     }
 }
 
@@ -129,7 +164,13 @@ fn stays(
         return Some(Some("it is a safe configuration, and people let it go".to_owned()));
     }
     if let Some(step) = moving(frame, frames, &world.system) {
-        return Some(Some(format!("`{step}` moves, and nobody asked for that")));
+        let why = match frame.left {
+            true => {
+                format!("`{step}` moves, and `{}` has to be asked for by its name", Ask::UndoOf(frame.configuration))
+            }
+            false => format!("`{step}` moves, and nobody asked for that"),
+        };
+        return Some(Some(why));
     }
     let mut components = share::components(&frame.footprint).into_iter();
     let broken = world.broken_at(&mut components).filter(|_| !repaired)?;

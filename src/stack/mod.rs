@@ -37,6 +37,7 @@ pub use answer::{Answer, Reason, Residual, TakenAlong};
 pub use batch::{Group, Rules, Told, held, keeps_still, may_apply, take_up};
 pub use desk::{ActiveBatch, Arrival, Arrived, Desk, GivenUp, Gone, given_up_of};
 pub use effort::{BestEffort, effort};
+pub use leave::Barring;
 pub use net::reduce;
 pub use permanent::may_commit;
 pub use pile::Pile;

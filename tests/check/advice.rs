@@ -332,6 +332,15 @@ fn what_is_no_answer_and_no_event_is_told_as_what_was_meant() {
     );
     let undone = told("base.undo.ok", "coord::answer_never_comes");
     assert!(undone.len() == 1 && undone[0].contains("`base.undo` is answered `base.undone`"), "{undone:?}");
+    for event in ["bsae.undo.ok", "bsae.undone"] {
+        let misspelt = told(event, "coord::unknown_answer");
+        assert!(
+            misspelt.len() == 1
+                && misspelt[0].contains("there is no configuration `bsae`")
+                && misspelt[0].ends_with("did you mean `base.undone`?"),
+            "{misspelt:?}"
+        );
+    }
     let soft = told("soft.ok", "coord::answer_never_comes");
     assert!(soft.len() == 1 && soft[0].contains("the coordinator does not ask for `soft`"), "{soft:?}");
     let fault = told("a.faultd", "coord::near_event");
@@ -358,4 +367,23 @@ fn a_change_that_stands_twice_is_told() {
     assert!(severity == "warning" && message.contains("a.open") && message.contains("stands twice"), "{message}");
     let set = told("property_set('a.gain', 2.0), property_set('a.gain', 2.0), property_set('a.gain', 2.0)");
     assert!(set.len() == 2 && set.iter().all(|(severity, _)| severity == "info"), "{set:?}");
+}
+
+/// One of two frames was undone, and the other one is in the way: to undo it first was done already.
+#[test]
+fn what_was_asked_for_twice_and_undone_once_is_told_as_that() {
+    let states = STATES.replace("src = \"up\", tgt = \"leaving\"", "src = \"up\", tgt = \"dropping\"");
+    let more = "on = state { entry = \"soft\" }, dropping = state { entry = \"soft.undo\" },
+        trans { src = \"up\", tgt = \"on\", events = { \"e_go\" } }, trans { src = \"on\", tgt = \"up\", events = { \"e_back\" } },
+        trans { src = \"on\", tgt = \"dropping\", events = { \"e_shutdown\" } },
+        trans { src = \"dropping\", tgt = \"leaving\", events = { \"soft.undone\", \"soft.undo.failed\", \"soft.undo.broken\" } },";
+    let said = Small::new(CONFIGURATIONS, &format!("{states}{more}"), "").check();
+    let found = texts(&said, "coord::request_refused");
+    let refused = found.iter().find(|(message, _)| message.starts_with("`base.undo`"));
+    let Some((message, help)) = refused else { panic!("{:#}", said.0) };
+    assert!(
+        message.contains("`soft.undo` was answered before: `soft` was asked for more than once")
+            && help.contains("`exit: soft.undo`"),
+        "{message}: {help}"
+    );
 }

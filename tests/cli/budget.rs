@@ -6,6 +6,7 @@ use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::Read;
 use std::os::fd::AsRawFd;
+use std::os::unix::process::ExitStatusExt;
 use std::process::Stdio;
 use std::sync::mpsc;
 
@@ -130,6 +131,21 @@ fn an_interrupted_script_checks_no_further_and_brings_nothing_up() {
     let told = demo.read("out") + &demo.read("err");
     assert_eq!(status.code(), Some(1), "{told}");
     assert!(told.contains("interrupted") && !told.contains(" in  ") && !told.contains("refused"), "{told}");
+}
+
+/// Who deploys is told that nothing was begun, and the process ends as it does by that signal.
+#[test]
+fn an_interrupted_deploy_says_that_nothing_was_begun() {
+    let demo = switches(40);
+    let err = demo.path("err");
+    let mut command = demo.command(&["deploy", "deployment.yaml"]);
+    command.stdout(Stdio::null()).stderr(Stdio::from(File::create(&err).expect("a file")));
+    let deploying = Foreground::start(&mut command);
+    until_it_follows(&deploying);
+    deploying.signal(libc::SIGINT);
+    let status = deploying.end();
+    assert_eq!(status.signal(), Some(libc::SIGINT), "{}", demo.read("err"));
+    assert_eq!(demo.read("err"), "interrupted while it was being checked: nothing was begun\n");
 }
 
 /// A `check` that goes on for long with its errors on a terminal: what is shown there, for whoever receives it, and the process.

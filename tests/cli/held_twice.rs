@@ -256,3 +256,30 @@ fn what_is_safe_and_was_left_goes_on_the_way_down() {
         assert_eq!((ran.code, ran.out.contains("build.undo.failed")), (0, false), "{between}: {}{}", ran.out, ran.err);
     }
 }
+
+/// What fails of one that another one counted on is told of both, and of each once.
+#[test]
+fn what_failed_of_both_is_told_once_of_each() {
+    let demo = Demo::new();
+    let conveyor = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/conveyor/conveyor.yaml");
+    demo.write(
+        "s.lua",
+        &format!(
+            "deploy('{conveyor}') wait(0.5)
+             fault('port_write belt.speed', 'slow', 1, 0.05) fault('port_write belt.speed', 'fail', 1)
+             raise('e_stop') wait(0.02) raise('e_stop') wait(2) shutdown()"
+        ),
+    );
+    let ran = demo.run(&["run", "s.lua", "--clock", "simulated"]);
+    let told: Vec<&str> =
+        ran.out.lines().filter(|line| line.contains("hold.broken") || line.contains("injected")).collect();
+    let alike = |at: usize| told.iter().skip(at).step_by(2);
+    assert!(
+        told.len() == 4
+            && alike(0).all(|line| line.contains("hold.broken"))
+            && alike(1).all(|line| line.contains("injected")),
+        "{}{}",
+        ran.out,
+        ran.err
+    );
+}

@@ -75,6 +75,63 @@ fn what_was_broken_and_came_back_goes_on_the_way_down() {
     );
 }
 
+/// What moves and was interrupted is not taken back unasked, though no step fails: `check` says what has to be asked for, and where that is
+/// asked for it goes.
+#[test]
+fn what_moves_and_was_interrupted_has_to_be_asked_for_by_its_name() {
+    let demo = Demo::new();
+    for file in ["conveyor.yaml", "configurations.yaml", "coordinator.yaml"] {
+        let text = std::fs::read_to_string(format!("{}/examples/conveyor/{file}", env!("CARGO_MANIFEST_DIR")));
+        demo.write(file, &text.unwrap());
+    }
+    demo.replace(
+        "configurations.yaml",
+        "port_write: { port: belt.speed, value: 0.1 }",
+        "operation_call: { operation: belt.lock }",
+    );
+    demo.replace(
+        "conveyor.yaml",
+        "    operations:\n",
+        "    operations:\n      lock:   { moves: true, effect: { undo: unlock } }\n      unlock: { moves: true, effect: { undo: lock } }\n",
+    );
+    demo.replace("coordinator.yaml", "running: { config: slow }", "ready: {}\n        running: { config: slow }");
+    demo.replace(
+        "coordinator.yaml",
+        "tgt: running, events: [run.ok] }",
+        "tgt: ready, events: [run.ok] }\n        - { src: ready, tgt: running, events: [e_go] }",
+    );
+    demo.replace("conveyor.yaml", "up: running", "up: ready");
+    let script = "fault('operation_call belt.lock', 'slow', 1, 0.3)
+        deploy('conveyor.yaml') wait(0.5)
+        raise('e_go') wait(0.07) raise('e_stop') wait(2)
+        raise('e_end') wait(1) shutdown()";
+    let checked = demo.run(&["check", "conveyor.yaml"]);
+    let flat = checked.err.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ");
+    for told in [
+        "`run.undo` is refused where something safe comes while `slow` is being applied: `operation_call belt.unlock()` moves and is not done \
+         unasked, and `run` cannot be undone before `slow`",
+        "ask for `slow.undo` before `run.undo` on every way down",
+    ] {
+        assert!(checked.code == 0 && checked.err.contains('⚠') && flat.contains(told), "{told}: {}", checked.err);
+    }
+    demo.write("s.lua", script);
+    let ran = demo.run(&["run", "s.lua", "--clock", "simulated"]);
+    let why = "that is not undone with it: `operation_call belt.unlock()` moves, and `slow.undo` has to be asked for by its name";
+    assert!(ran.code == 4 && ran.out.contains(why), "{}{}", ran.out, ran.err);
+
+    demo.replace(
+        "coordinator.yaml",
+        "stopping: { entry: run.undo }",
+        "unlocking: { entry: slow.undo }\n        stopping: { entry: run.undo }",
+    );
+    demo.replace(
+        "coordinator.yaml",
+        "src: initial, tgt: stopping }",
+        "src: initial, tgt: unlocking }\n        - { src: unlocking, tgt: stopping, events: [slow.undone, slow.undo.failed, slow.undo.broken] }",
+    );
+    goes_down(&demo, script, &["slow.broken", "slow.undone"]);
+}
+
 /// It is in the way of another coordinator's undo alone, when its own has come to its end.
 #[test]
 fn what_is_in_the_way_of_another_coordinator_goes_on_the_way_down() {
