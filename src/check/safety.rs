@@ -9,7 +9,7 @@ use super::state::{Failed, Move, Next, ProductState};
 use crate::limits;
 use crate::model::codes::COORD_SAFETY_UNHEARD;
 use crate::model::finding::{count, did_you_mean};
-use crate::model::{Ask, Catalogue, ChangeKind, ConfigId, Deployment, EventName, Finding, Findings, Origin, Severity};
+use crate::model::{Ask, Catalogue, ConfigId, Deployment, EventName, Finding, Findings, Origin, Severity};
 use crate::statechart::{Chart, EventId, NodeId};
 use rustc_hash::{FxHashMap, FxHashSet};
 use smallvec::SmallVec;
@@ -31,11 +31,9 @@ pub(super) fn unnamed(deployment: &Deployment, catalogue: &Catalogue) -> Option<
         return None;
     }
     let changes = deployment.configurations.iter().flat_map(|of| &of.changes);
-    let (component, at) = changes.into_iter().find_map(|change| match &change.kind {
-        ChangeKind::Create { component, ty, .. } | ChangeKind::Replace { component, ty, .. } => {
-            catalogue.get(*ty).is_some_and(|ty| ty.actuator).then_some((component, change.origin))
-        }
-        _ => None,
+    let (component, at) = changes.into_iter().find_map(|change| {
+        let (component, ty, _) = change.kind.makes()?;
+        catalogue.get(ty).is_some_and(|ty| ty.actuator).then_some((component, change.origin))
     })?;
     let message = format!("`{component}` moves something (`actuator: true`), and no event is named under `safety`");
     let help = "name the event that stops it, `safety: [e_stop]`, and let it lead to a `safe` configuration: it is heard before all others, also while the \

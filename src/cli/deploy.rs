@@ -155,6 +155,7 @@ impl Args {
             Ok(()) => {
                 tell_up(&context.out, progress, &session, in_background);
                 if in_background {
+                    super::detach::stays_by_itself();
                     progress.up_in_background();
                 }
                 let Command::Shutdown { force } = session.serve();

@@ -66,15 +66,16 @@ pub fn run(context: &CommandContext) -> CommandResult {
     let mut child = {
         // Also a third signal, which ends the command, waits until there is somebody to be told.
         let mut passed = lock(&passed);
-        let child = Command::new(program)
+        let mut command = Command::new(program);
+        command
             .args(arguments)
             .arg("--in-background")
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             // A group of its own: Ctrl-C in this terminal is not meant for it any more.
-            .process_group(0)
-            .spawn()
-            .map_err(|e| failed("the process in the background cannot be started", &e))?;
+            .process_group(0);
+        ends_with_this_process(&mut command);
+        let child = command.spawn().map_err(|e| failed("the process in the background cannot be started", &e))?;
         passed.to(child.id());
         child
     };
@@ -105,6 +106,30 @@ pub fn run(context: &CommandContext) -> CommandResult {
             .error("not up: interrupted in the moment in which it was; `davit status` says how it was shut down\n");
     }
     Ok(exit(status, interrupted))
+}
+
+/// Who is killed has asked for nothing more: what it brings up is led down then, as by Ctrl-C, until it is up
+/// ([`stays_by_itself`]).
+fn ends_with_this_process(command: &mut Command) {
+    let own = std::process::id();
+    let signal = libc::c_ulong::try_from(libc::SIGINT).unwrap_or_default();
+    let begins = move || {
+        // SAFETY: it sets one number of the process's own, and is a call of the system alone, as is the next.
+        let (told, parent) = unsafe { (libc::prctl(libc::PR_SET_PDEATHSIG, signal), libc::getppid()) };
+        // It may have ended before that was said.
+        match told == 0 && u32::try_from(parent) == Ok(own) {
+            true => Ok(()),
+            false => Err(std::io::Error::from_raw_os_error(libc::ESRCH)),
+        }
+    };
+    // SAFETY: between `fork` and `exec` nothing is allocated and no lock is taken by it.
+    unsafe { command.pre_exec(begins) };
+}
+
+/// It is up: whoever has started it may end.
+pub fn stays_by_itself() {
+    // SAFETY: as above.
+    unsafe { libc::prctl(libc::PR_SET_PDEATHSIG, libc::c_ulong::default()) };
 }
 
 /// Of a process that has ended and did not stay up.

@@ -44,7 +44,7 @@ pub fn plan(title: &str, plans: &[DrawnPlan], said: &dyn Fn(&Step) -> String) ->
     }
     diagram.legend = vec![
         (Tone::Good, "exact: its inverse restores what was".to_owned()),
-        (Tone::Care, "compensated: another call makes good for it".to_owned()),
+        (Tone::Care, "compensated: another call makes good for it, or nothing has to".to_owned()),
         (Tone::Bad, "irreversible".to_owned()),
     ];
     diagram
@@ -84,6 +84,9 @@ fn lanes(diagram: &mut Diagram, group: usize, steps: &[PlannedStep], said: &dyn 
             if !node.lines[0].starts_with(&back) {
                 node.whole = vec![title.clone(), back + moving];
             }
+        }
+        if step.moves {
+            node.lines.push("moves hardware".to_owned());
         }
         if node.title != title && node.whole.is_empty() {
             node.whole = vec![title];

@@ -423,11 +423,6 @@ impl Hub {
         news.find(|(number, _)| !but.contains(number)).map(|(number, _)| number)
     }
 
-    /// Whether no request has been answered.
-    pub fn has_answered_nothing(&self) -> bool {
-        self.lock().answers.is_empty()
-    }
-
     /// The answer to a request, if it has come (and is not long ago).
     pub fn answer(&self, request: RequestId) -> Option<LoggedAnswer> {
         self.lock().answers.iter().rev().find(|a| a.request == request.0).cloned()

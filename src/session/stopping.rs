@@ -290,8 +290,8 @@ impl Session {
             return (Came::Hurried, held);
         }
         if down.is_clean() {
-            // Of a bring-up that had not begun nothing was taken back. Of one that has, its coordinator has not led down.
-            if told.coming_up && down.is_idle() && self.hub().has_answered_nothing() {
+            // Of a bring-up that had not begun, or has taken everything back itself, nothing was taken back here.
+            if told.coming_up && down.is_idle() {
                 told.stage = Stage::Led;
                 told.notes.clear();
             }

@@ -153,7 +153,10 @@ impl<'c, F: Hook> Sim<'c, F> {
         let more = if unknown.len() > UNKNOWN_SHOWN { " and others" } else { "" };
         unknown.truncate(UNKNOWN_SHOWN);
         let Some(last) = unknown.last() else { return };
-        let near = nearest(last, chart.events().iter().map(EventName::as_str)).filter(|_| unknown.len() == 1);
+        // An answer that is spelt rightly is not meant to be another one.
+        let answer = |name: &&str| crate::model::Verdict::ENDINGS.iter().any(|ending| name.ends_with(ending));
+        let is_slip = unknown.len() == 1 && !answer(last);
+        let near = nearest(last, chart.events().iter().map(EventName::as_str)).filter(|_| is_slip);
         let near = near.map(|near| format!("; did you mean `{near}`?")).unwrap_or_default();
         trace.note(format!("no transition lists `{}`{more}{near}", unknown.join("`, `")));
     }

@@ -344,7 +344,13 @@ pub(crate) fn bad_value(slot: MemberRef, declared: &PropertyType, value: &Value)
         Err(error) => error.to_string(),
         Ok(fitted) => unfitted(&declared.ty, &fitted),
     };
-    let wanted = wanted(&declared.ty, declared.unit.as_deref());
+    let bounds = match (declared.min, declared.max) {
+        (Some(min), Some(max)) => format!(", from {min} to {max}"),
+        (Some(min), None) => format!(", at least {min}"),
+        (None, Some(max)) => format!(", at most {max}"),
+        (None, None) => String::new(),
+    };
+    let wanted = wanted(&declared.ty, declared.unit.as_deref()) + &bounds;
     Some(Violation::BadValue { slot, value: brief(value), reason, wanted, declared: declared.origin })
 }
 

@@ -43,7 +43,8 @@ fn one_that_fails_in_part_stays_and_is_undone_to_what_is_in_force() {
     assert_eq!(said(&demo, &story("port_write motor.speed = 0.0")), ["stopped 0.4", "reset nil"]);
     // Also where its coordinator lets go of it at once.
     demo.replace("belt/coordinator.yaml", "events: [e_reset]", "events: [e_reset, stop.failed, stop.broken]");
-    let at_once = story("operation_call motor.brake").replace("wait_state('stopped.in_part', 0)", "wait_state('failed', 0)");
+    let at_once =
+        story("operation_call motor.brake").replace("wait_state('stopped.in_part', 0)", "wait_state('failed', 0)");
     assert_eq!(said(&demo, &at_once), ["stopped nil", "reset nil"]);
 }
 
@@ -53,7 +54,10 @@ fn who_lets_go_of_one_unasked_is_told() {
         let demo = belt();
         assert_eq!(found(&demo, "coord::safe_left"), [Json::Null; 0]);
         demo.replace("belt/coordinator.yaml", from, to);
-        found(&demo, "coord::safe_left").into_iter().map(|one| one["message"].as_str().unwrap().to_owned()).collect::<Vec<_>>()
+        found(&demo, "coord::safe_left")
+            .into_iter()
+            .map(|one| one["message"].as_str().unwrap().to_owned())
+            .collect::<Vec<_>>()
     };
     let reset = "{ src: stopped, tgt: failed, events: [e_reset] }";
     for (by, told) in [
@@ -63,12 +67,18 @@ fn who_lets_go_of_one_unasked_is_told() {
         ("pn: -1", "whatever comes next leads from"),
     ] {
         let told_of = lets_go(reset, &format!("{{ src: stopped, tgt: failed, {by} }}"));
-        assert!(told_of.len() == 1 && told_of[0].contains(told) && told_of[0].contains("takes `stop` back"), "{told_of:?}");
+        assert!(
+            told_of.len() == 1 && told_of[0].contains(told) && told_of[0].contains("takes `stop` back"),
+            "{told_of:?}"
+        );
     }
     // From inside as well; and not where what is entered asks for what is safe.
     let inside = lets_go(reset, "{ src: stopped.in_part, tgt: failed, events: [stop.broken] }");
     assert_eq!(inside.len(), 1, "{inside:?}");
-    let anew = lets_go("{ src: stopped, tgt: stopped, events: [e_stop] }", "{ src: stopped, tgt: stopped, events: [e_stop, e_after(5)] }");
+    let anew = lets_go(
+        "{ src: stopped, tgt: stopped, events: [e_stop] }",
+        "{ src: stopped, tgt: stopped, events: [e_stop, e_after(5)] }",
+    );
     assert!(anew.is_empty(), "{anew:?}");
     // The help of a failure that nobody hears does not lead there.
     let demo = belt();
@@ -98,6 +108,8 @@ fn one_of_no_group_is_given_one() {
 #[test]
 fn a_second_one_is_not_answered_by_the_first() {
     let twice = "raise('e_stop') wait_answer('stop.ok', 2) say(now())";
-    let script = format!("deploy('deployment.yaml') fault('operation_call motor.brake', 'slow', 5, 0.5) {twice} {twice} shutdown()");
+    let script = format!(
+        "deploy('deployment.yaml') fault('operation_call motor.brake', 'slow', 5, 0.5) {twice} {twice} shutdown()"
+    );
     assert_eq!(said(&belt(), &script), ["0.5", "1.0"]);
 }

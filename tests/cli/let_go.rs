@@ -192,7 +192,7 @@ fn what_is_in_the_way_of_another_coordinator_goes_on_the_way_down() {
 fn what_is_safe_and_was_let_go_of_before_it_was_there_goes_on_the_way_down() {
     let demo = conveyor();
     demo.replace("configurations.yaml", "    group: speed\n", "");
-    demo.replace("coordinator.yaml", "held: { config: hold }", "held: { entry: hold, exit: hold.undo }");
+    demo.replace("coordinator.yaml", "      config: hold\n", "      entry: hold\n      exit: hold.undo\n");
     demo.replace(
         "coordinator.yaml",
         "src: held, tgt: held, events: [e_stop]",

@@ -73,33 +73,6 @@ fn what_its_coordinator_does_not_do_is_told_by_the_exit_status() {
     assert!(demo.read("out").contains("without its coordinator, nothing is left"), "{}", demo.read("out"));
 }
 
-/// Also of a bring-up that broke and was made whole by an answer that was late: its coordinator has not led down.
-#[test]
-fn a_bring_up_that_was_made_whole_meanwhile_has_not_been_led_down() {
-    let demo = Demo::new();
-    demo.write("late.yaml", LATE);
-    let shipped = |name: &str| std::fs::read_to_string(format!("{}/configs/hello/{name}.lua", env!("CARGO_MANIFEST_DIR")));
-    for name in ["configurations", "coordinator"] {
-        demo.write(&format!("{name}.lua"), &shipped(name).unwrap());
-    }
-    let ran = demo.run(&["deploy", "late.yaml", "--clock", "simulated", "--pace", "0"]);
-    assert!(ran.out.contains("stopping  without its coordinator"), "{}{}", ran.out, ran.err);
-    assert_eq!(ran.code, 4, "{}{}", ran.out, ran.err);
-}
-
-/// The gentlest example, with a connection that takes longer than a step may.
-const LATE: &str = "davit: 1
-name: late
-platform: simulated
-libraries: [standard]
-activities: { loop: { period_ms: 10.0 } }
-configurations: [configurations.lua]
-coordinator: coordinator.lua
-deploy:   { event: e_start, up: operational, failed: [failed], within_s: 5 }
-shutdown: { event: e_stop,  down: idle, within_s: 5 }
-faults: [{ step: \"connect gain.y -> limit.u\", how: slow, times: 1, takes_s: 1.5 }]
-";
-
 /// A second signal does not wait for the coordinator, and neither does `--force`; meanwhile nobody changes anything.
 #[test]
 fn a_second_signal_and_force_begin_with_force() {
@@ -168,6 +141,22 @@ fn an_interrupted_command_says_that_what_it_started_is_not_up() {
         assert!(words.contains("not up: ") && words.contains("signal 9"), "{words}");
         assert_eq!(words.contains("interrupted"), interrupted, "{words}");
     }
+}
+
+/// Who is killed while it comes up has asked for nothing more.
+#[test]
+fn what_a_killed_command_was_bringing_up_is_led_down() {
+    let demo = Demo::new();
+    slow(&demo);
+    let mut command = demo.command(&["deploy", "deployment.yaml", "--detach", "--color", "never"]);
+    command.stdout(Stdio::from(File::create(demo.path("out")).unwrap())).stderr(Stdio::null());
+    let command = Foreground::start(&mut command);
+    until("the call", || demo.read("out").contains("slow_mode").then_some(()));
+    command.signal(libc::SIGKILL);
+    assert_eq!(command.end().code(), None);
+    until("it has ended", || (demo.run(&["status"]).code != 0).then_some(()));
+    let log = demo.read("state/davit/demo.log");
+    assert!(log.contains("\"shutting_down\"") && !log.contains("\"phase\":\"up\""), "{log}");
 }
 
 /// A bring-up that fails ends with 1 where its coordinator leads down.

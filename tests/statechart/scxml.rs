@@ -214,14 +214,19 @@ fn what_would_be_decided_otherwise_is_a_warning() {
 fn who_edits_what_was_written_is_heard() {
     let lua = "return state { a = state { config = 'soft' }, b = state {}, trans { src = 'initial', tgt = 'a' },
         trans { src = 'a', tgt = 'b', events = { 'e_go', 'e_after(10)' } }, trans { src = 'b', tgt = 'a', events = { 'e_back' } } }";
-    let loaded = lang::load_coordinator(&Sources::memory([("c.lua", lua)]), Path::new("c.lua"), &LoadOptions::default());
+    let loaded =
+        lang::load_coordinator(&Sources::memory([("c.lua", lua)]), Path::new("c.lua"), &LoadOptions::default());
     let text = print::scxml::coordinator_scxml(&loaded.coordinator.unwrap());
     assert_eq!(findings(&text), Vec::<String>::new(), "{text}");
     for (from, to, told) in [
         ("event=\"e_back\"", "evnt=\"e_back\"", "`transition` has no attribute `evnt`"),
         ("event=\"e_go ", "event=\"e_og ", "`event` says `e_og e_after.10.root.a`, and `davit:event` beside it"),
         ("davit:event=\"e_go ", "davit:event=\"e_og ", "and `davit:event` beside it `e_og e_after(10)`"),
-        ("delay=\"10s\"", "delay=\"20s\"", "is sent after `20s`, and the transition that waits for it has `e_after(10)`"),
+        (
+            "delay=\"10s\"",
+            "delay=\"20s\"",
+            "is sent after `20s`, and the transition that waits for it has `e_after(10)`",
+        ),
         ("davit:config=\"soft\"", "config=\"soft\"", "`state` has no attribute `config`"),
         ("version=", "verson=", "`scxml` has no attribute `verson`"),
     ] {

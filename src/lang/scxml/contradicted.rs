@@ -11,7 +11,10 @@ use roxmltree::Node as Element;
 impl<'t> ScxmlReader<'_, 't> {
     /// That `event` is what `davit:event` comes to there.
     pub(super) fn events_agree(&mut self, element: Element<'_, 't>, fqn: &str, of: &ChartTransition) {
-        let (Some(said), Some(exact)) = (element.attribute("event"), own(element, "event")) else { return };
+        // A name without a namespace finds those of any.
+        let plain =
+            element.attributes().find(|attribute| attribute.namespace().is_none() && attribute.name() == "event");
+        let (Some(said), Some(exact)) = (plain.map(|event| event.value()), own(element, "event")) else { return };
         let names = of.events.iter().filter_map(|(trigger, _)| event_name(trigger, fqn));
         let plain: Vec<String> = names.map(|name| plain_event(&name)).collect();
         if said.split_whitespace().ne(plain.iter().map(String::as_str)) {
