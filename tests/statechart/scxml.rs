@@ -228,7 +228,7 @@ fn who_edits_what_was_written_is_heard() {
             "is sent after `20s`, and the transition that waits for it has `e_after(10)`",
         ),
         ("davit:config=\"soft\"", "config=\"soft\"", "`state` has no attribute `config`"),
-        ("version=", "verson=", "`scxml` has no attribute `verson`"),
+        ("version=\"1.0\" datamodel", "verson=\"1.0\" datamodel", "`scxml` has no attribute `verson`"),
     ] {
         assert!(text.contains(from), "{from} {text}");
         let found = findings(&text.replacen(from, to, 1));
