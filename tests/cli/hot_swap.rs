@@ -133,7 +133,7 @@ const SHARED: &[Shared] = &[
         wrong: [
             "conf::bad_value",
             "`ctrl.k` cannot be 2.0: 2 is less than 20",
-            "give it a value of type float, in N (written without the unit)",
+            "give it a value of type float, in N (written without the unit), at least 20",
         ],
     },
     Shared {
