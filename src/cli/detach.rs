@@ -108,11 +108,12 @@ pub fn run(context: &CommandContext) -> CommandResult {
     Ok(exit(status, interrupted))
 }
 
-/// Who is killed has asked for nothing more: what it brings up is led down then, as by Ctrl-C, until it is up
+/// Who is killed has asked for nothing more: what it brings up is led down then, as by SIGTERM (a shell has what it starts beside itself
+/// ignore Ctrl-C), until it is up
 /// ([`stays_by_itself`]).
 fn ends_with_this_process(command: &mut Command) {
     let own = std::process::id();
-    let signal = libc::c_ulong::try_from(libc::SIGINT).unwrap_or_default();
+    let signal = libc::c_ulong::try_from(libc::SIGTERM).unwrap_or_default();
     let begins = move || {
         // SAFETY: it sets one number of the process's own, and is a call of the system alone, as is the next.
         let (told, parent) = unsafe { (libc::prctl(libc::PR_SET_PDEATHSIG, signal), libc::getppid()) };

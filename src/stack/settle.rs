@@ -150,8 +150,9 @@ impl World {
         busy: &[FrameId],
     ) -> (FrameId, Verdict) {
         let broken = end.failed.is_some();
-        if broken && !end.interrupts {
-            // What was done of it undoes what was done, and no more: what it was to take the place of is taken over with what that undoes.
+        if broken {
+            // What was done of it undoes what was done, and no more: what it was to take the place of is taken over with what that undoes,
+            // also where something else was under way.
             edits.pops.clear();
         }
         let frame = match end.failed {

@@ -41,6 +41,11 @@ fn one_that_fails_in_part_stays_and_is_undone_to_what_is_in_force() {
     let demo = belt();
     assert_eq!(said(&demo, &story("operation_call motor.brake")), ["stopped 0.0", "reset nil"]);
     assert_eq!(said(&demo, &story("port_write motor.speed = 0.0")), ["stopped 0.4", "reset nil"]);
+    // Also where something else is under way, which it interrupts.
+    for fault in ["operation_call motor.brake", "port_write motor.speed = 0.0"] {
+        let beside = story(fault).replace("raise('e_stop')", "set('motor.limit', 0.7) raise('e_stop')");
+        assert_eq!(said(&demo, &beside)[1..], ["reset nil"], "{fault}");
+    }
     // Also where its coordinator lets go of it at once.
     demo.replace("belt/coordinator.yaml", "events: [e_reset]", "events: [e_reset, stop.failed, stop.broken]");
     let at_once =
