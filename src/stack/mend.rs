@@ -6,13 +6,14 @@
 //! leads to (semantics: *What goes wrong*).
 
 use super::net::is_bound;
+use super::squash::list;
 use super::work::{Op, Planned, transaction};
-use super::{Broken, Frame, FrameId, HandOver, SafeWrites, World, net};
-use crate::model::{ComponentName, MemberRef, Origin, RunState, Step};
+use super::{Broken, Frame, FrameId, HandOver, Inverse, SafeWrites, World, net};
+use crate::model::{ComponentName, MemberRef, Origin, RunState, Snapshot, Step};
 use crate::plan::footprint::{Footprint, Index, Saved, Slot};
 use crate::plan::undo::{DraftStep, Script, absolute};
 use crate::plan::{PlanContext, PlanStage, PlannedStep, SavedValue, StepId};
-use crate::system::touch::{Access, touches};
+use crate::system::touch::{self, Access, touches};
 use crate::system::{Overlay, System, View as _, diff, step};
 use smallvec::SmallVec;
 use std::sync::Arc;
@@ -157,6 +158,45 @@ impl World {
                 frames.filter_map(move |frame| Some((frame, frame.saved.iter().find(|saved| saved.slot == slot)?)));
             writes.take_while(|(frame, _)| frame.safe).last().map(|(frame, saved)| (frame.id, saved))
         })
+    }
+
+    /// What is safe has taken the place of frames (`popped`) among those `before`, oldest first: its undo leads to where theirs would have
+    /// led, so what they did to something broken is expected no more.
+    pub(super) fn expects_no_more(&mut self, before: &[Arc<Frame>], popped: impl Fn(&Frame) -> bool) {
+        for at in (0..before.len()).rev().filter(|at| !before[*at].safe && popped(&before[*at])) {
+            let above = || before[at + 1..].iter().filter(|above| !above.safe && !popped(above));
+            let items = list(&before[at]);
+            for broken in &mut self.broken {
+                let components: Vec<ComponentName> = broken.components.iter().copied().collect();
+                let mut meant = self.system.clone();
+                if meant.adopt(&components, &broken.expected).is_err() {
+                    continue;
+                }
+                let own = |step: &Step| touch::components(step).iter().any(|of| broken.components.contains(of));
+                for step in items.iter().map(|item| &item.step).filter(|step| own(step)) {
+                    let stays = |slot| above().any(|above| above.saved.iter().any(|saved| saved.slot == slot));
+                    if !absolute(step).is_some_and(stays) {
+                        _ = goes_on(step, &mut meant);
+                    }
+                }
+                broken.expected = meant.snapshot_some(&components);
+            }
+        }
+    }
+
+    /// What it takes back of theirs is no more than what is there of something broken: there would be no undo of it.
+    pub(super) fn takes_back_what_is_there(&mut self, pushed: FrameId) {
+        let Some(frame) = self.stack.frame(pushed) else { return };
+        let Inverse::List(items) = &frame.inverse else { return };
+        let mut left = self.system.clone();
+        let mut is_there = |item: &&DraftStep| {
+            goes_on(&item.step, &mut left) || self.broken_at(touch::components(&item.step).into_iter()).is_none()
+        };
+        let kept: Vec<DraftStep> = items.iter().filter(|item| is_there(item)).cloned().collect();
+        if kept.len() < items.len() {
+            let frame = Frame { inverse: Inverse::List(Arc::new(kept)), ..(**frame).clone() };
+            self.stack.replace(frame);
+        }
     }
 
     /// Whether safe configurations in force have brought something broken to where it is expected, though their undo leads
@@ -317,5 +357,39 @@ impl World {
             step::apply(&planned.step, &mut reached).ok()?;
         }
         diff(&reached, end).is_empty().then_some(steps)
+    }
+}
+
+/// Does a step where there is what it begins with; that it may be done now is nothing to ask. False: there is not.
+fn goes_on(step: &Step, system: &mut System) -> bool {
+    let there = leads_on(step, system);
+    match step {
+        // With what is connected to it: others may have done that.
+        Step::Destroy { component } if there => _ = system.adopt(&[*component], &Snapshot::default()),
+        _ if there => step::effect(step, system),
+        _ => {}
+    }
+    there
+}
+
+/// Whether there is in `system` what a step begins with. That it may be done now is nothing to ask.
+fn leads_on(step: &Step, system: &System) -> bool {
+    let member = |of: MemberRef| {
+        let node = system.component(of.component);
+        node.is_some_and(|node| node.property(of.member).is_some() || node.port(of.member).is_some())
+    };
+    let connected = |from: MemberRef, to: MemberRef| system.link(from, to).is_some();
+    match step {
+        Step::State { component, transition } => {
+            system.component(*component).is_some_and(|node| node.state == transition.inverse().target())
+        }
+        Step::Create { component, ty, .. } => {
+            system.component(*component).is_none() && system.catalogue().get(*ty).is_some()
+        }
+        Step::Connect { from, to, .. } => member(*from) && member(*to) && !connected(*from, *to),
+        Step::Disconnect { from, to } => connected(*from, *to),
+        Step::PropertySet { property: of, .. } | Step::PortWrite { port: of, .. } => member(*of),
+        Step::Destroy { component } => system.component(*component).is_some(),
+        Step::Operation(call) => system.component(call.operation.component).is_some(),
     }
 }

@@ -261,6 +261,11 @@ impl Stack {
         self.committed.iter().any(fits) || self.frames.iter().any(|f| f.parts.iter().any(fits))
     }
 
+    /// Whether a frame was squashed into one of these.
+    fn has_squashed(&self, frame: &Frame) -> bool {
+        self.frames.iter().any(|other| other.parts.contains(&frame.buried()))
+    }
+
     /// Whether a configuration stands, for what it stands for: in a frame that is whole, squashed and committed ones included.
     pub fn is_in_force(&self, id: ConfigId) -> bool {
         self.is_buried(id, None) || self.frames.iter().any(|frame| frame.configuration == id && !frame.partial)

@@ -166,7 +166,18 @@ impl World {
         let stack = &self.stack;
         let there = |frame: &FrameId| stack.frame(*frame).is_some();
         let broken: Vec<FrameId> = self.broken.iter().filter_map(|broken| broken.frame).filter(there).collect();
+        let group = frame.group;
+        let gone: SmallVec<[FrameId; 2]> = edits.pops.iter().map(|(frame, _)| *frame).collect();
+        let before = if self.broken.is_empty() { Vec::new() } else { self.stack.frames().to_vec() };
         let pushed = self.stack.push_safe(edits, frame, busy, &broken);
+        if !before.is_empty() {
+            let after = self.stack.clone();
+            self.expects_no_more(&before, |frame| {
+                let of_group = group.is_some() && frame.group == group && !after.has_squashed(frame);
+                after.frame(frame.id).is_none() && (gone.contains(&frame.id) || of_group)
+            });
+            self.takes_back_what_is_there(pushed);
+        }
         let gone: Vec<FrameId> = broken.into_iter().filter(|frame| self.stack.frame(*frame).is_none()).collect();
         for frame in self.broken.iter_mut().filter_map(|broken| broken.frame.as_mut()) {
             if gone.contains(frame) {

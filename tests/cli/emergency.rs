@@ -53,6 +53,41 @@ fn one_that_fails_in_part_stays_and_is_undone_to_what_is_in_force() {
     assert_eq!(said(&demo, &at_once), ["stopped nil", "reset nil"]);
 }
 
+/// The platform lies, a look finds that, and an emergency of the same group takes the place of what has lied: its undo leads to where that of
+/// the other would have led, and nothing is mended to what nobody has in force any more.
+#[test]
+fn what_an_emergency_takes_the_place_of_is_expected_no_more() {
+    let demo = belt();
+    demo.replace(
+        "belt/configurations.yaml",
+        "      - create: { component: motor, type: Motor }",
+        "      - create: { component: motor, type: Motor }\n      - create: { component: aux, type: Motor }",
+    );
+    demo.replace("belt/configurations.yaml", "[\"motor:stopped\"]", "[\"motor:stopped\", \"aux:stopped\"]");
+    demo.replace(
+        "belt/configurations.yaml",
+        "      - port_write: { port: motor.speed, value: 0.4 }",
+        "      - port_write: { port: motor.speed, value: 0.4 }\n      - create: { component: third, type: Motor }\n    post_conf_state: [\"aux:running\", \"third:stopped\"]",
+    );
+    for (lie, seen) in [
+        ("port_write motor.speed = 0.4", "port_write motor.speed = 0.1"),
+        ("start aux", "stop aux"),
+        ("configure third", "cleanup third"),
+    ] {
+        let story = format!(
+            "deploy('deployment.yaml')
+             local function tell(when) say(when .. ' ' .. tostring(port('motor.speed')) .. ' ' .. state('aux') .. ' ' .. tostring(state('third')) .. ' ' .. #drift()) end
+             fault('{lie}', 'lie') raise('e_faster') wait_answer('fast.ok', 1) wait(6)
+             raise('e_stop') wait_state('stopped', 1) wait(1) raise('e_reset') wait_state('failed', 1) wait(6) tell('reset')
+             recover('back') wait(1) tell('recovered') shutdown() wait(6)"
+        );
+        let told = said(&demo, &story);
+        let reset: Vec<&String> = told.iter().filter(|line| !line.contains("note ")).collect();
+        assert!(told.iter().any(|line| line.contains(seen)), "{lie}: {told:?}");
+        assert_eq!(reset, ["reset nil stopped nil 0", "recovered nil stopped nil 0"], "{lie}");
+    }
+}
+
 #[test]
 fn who_lets_go_of_one_unasked_is_told() {
     let lets_go = |from: &str, to: &str| {
