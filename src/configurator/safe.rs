@@ -200,6 +200,10 @@ impl Engine {
     ) {
         let (request, frame, mut touched) = safe;
         machine.note_done(&mut touched);
+        let given = machine.planned().popped.iter().flat_map(|frame| &frame.saved).map(|saved| saved.slot);
+        let given: Vec<_> = given.collect();
+        let failed = machine.failed_steps().map(|planned| &planned.step);
+        touched.missed(failed.filter(|step| !given.contains(&slot(step))));
         // Also if it comes no further: what was interrupted heeds it. Calls are kept by its frame alone.
         self.safety.touched.join(touched.without_calls());
         let mut missed: Vec<Step> = machine.missed().cloned().collect();

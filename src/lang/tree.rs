@@ -171,20 +171,20 @@ impl Cx {
 
     /// Reports that a node is not of the kind wanted; `example` is a line as it should be.
     pub fn wrong(&mut self, node: &Node, what: &str, expected: &str, example: &str) {
-        if matches!(node.kind, Kind::Poison) {
-            return;
-        }
-        let origin = self.place(node);
-        let message = format!("{what} must be {expected}, this is {}", node.describe());
         let quoted = matches!(node.kind, Kind::Bool(_) | Kind::Int(_) | Kind::Float(_));
         let hint = if quoted && expected.contains("text") { " (quotes make a text of it)" } else { "" };
         let example = self.spelt(node.origin, example);
-        self.report(
-            Finding::error(codes::TEXT_WRONG_TYPE, message)
-                .at(origin)
-                .labelled(format!("expected {expected}"))
-                .help(format!("write it like `{example}`{hint}")),
-        );
+        self.wrong_so(node, what, expected, &format!("write it like `{example}`{hint}"));
+    }
+
+    /// The same where no line of that kind would do: what to do instead.
+    pub fn wrong_so(&mut self, node: &Node, what: &str, expected: &str, help: &str) {
+        if matches!(node.kind, Kind::Poison) {
+            return;
+        }
+        let message = format!("{what} must be {expected}, this is {}", node.describe());
+        let finding = Finding::error(codes::TEXT_WRONG_TYPE, message).at(self.place(node));
+        self.report(finding.labelled(format!("expected {expected}")).help(help));
     }
 }
 
@@ -267,7 +267,7 @@ impl Fields {
         if field.is_none() {
             // A misspelt key would give two findings for one mistake: the unknown key alone tells it.
             if !self.misspelt(key) {
-                let help = help(cx, self.origin);
+                let help = self.is_another_file().unwrap_or_else(|| help(cx, self.origin));
                 cx.report(
                     Finding::error(codes::TEXT_MISSING_KEY, format!("{} needs `{key}`", self.object.what))
                         .at(self.origin)
@@ -277,6 +277,18 @@ impl Fields {
             }
         }
         field
+    }
+
+    /// What to do where a whole file is one of another kind than it is listed as.
+    fn is_another_file(&self) -> Option<String> {
+        let of_this = |file: &&super::grammar::File| std::ptr::eq(file.object, self.object);
+        let this = super::grammar::FILES.iter().find(of_this)?.name;
+        let has = |name: &str| self.entries.iter().flatten().any(|entry| entry.key == name);
+        let other =
+            super::grammar::FILES.iter().find(|file| self.object.key(file.name).is_none() && has(file.name))?.name;
+        Some(format!(
+            "what stands here is `{other}`: name this file under `{other}` in the deployment, and not under `{this}`"
+        ))
     }
 
     /// Whether what is left has a key that is probably meant to be this one.

@@ -160,7 +160,7 @@ pub fn configuration(finding: &Finding) -> Option<&str> {
 }
 
 /// The known name nearest to `name`, if one is near enough to be what was meant: as a whole, or, where `name` has one part
-/// only, by its last part (`Gian` for `standard.Gain`).
+/// only, by its last part (`Gian` for `standard.Gain`), or as one of its words (`set` for `property_set`).
 pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     // Whether it is near enough is asked of the whole; which is nearest, of what would have to be typed otherwise, and then of how they
     // begin: capitals count only there.
@@ -175,7 +175,8 @@ pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Opti
         .filter(|candidate| *candidate != name)
         .flat_map(|candidate| {
             let last = candidate.rsplit_once('.').filter(|_| !name.contains('.')).map(|(_, last)| last);
-            std::iter::once(candidate).chain(last).map(move |part| (near(part), candidate))
+            let word = candidate.split('_').find(|word| word.len() > 2 && *word == name);
+            std::iter::once(candidate).chain(last).chain(word).map(move |part| (near(part), candidate))
         })
         .filter(|((_, score, _), candidate)| *score > 0.8 || is_short_for(name, candidate))
         .min_by(|(a, one), (b, other)| a.0.cmp(&b.0).then(b.2.total_cmp(&a.2)).then(one.cmp(other)))

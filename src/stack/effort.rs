@@ -3,13 +3,13 @@
 //! It is planned whole where that goes; else piece by piece, each piece by itself. What concerns a component that is not
 //! there has nothing to be made safe, and is left out.
 
-use super::share::shares;
+use super::share::{self, HandOver, shares};
 use super::squash::{list, squash};
 use super::void::rest;
 use super::work::{Op, Part, Planned, transaction};
 use super::{Edits, Frame, FrameId, Inverse, Reason, Request, Stack};
 use crate::model::{Change, ChangeKind, ComponentName, Configuration, StateEntry, StateList, Step, Target, codes};
-use crate::plan::footprint::Footprint;
+use crate::plan::footprint::{Footprint, Slot};
 use crate::plan::undo::{DraftStep, items};
 use crate::plan::{PlanContext, PlannedStep, plan_on};
 use crate::system::{Overlay, System, View};
@@ -82,13 +82,35 @@ pub(super) fn take_over_group(frames: &mut Vec<Arc<Frame>>, pushed: FrameId, bus
     for below in (0..at).rev() {
         let (old, new) = (&frames[below], &frames[at]);
         let free = !busy.contains(&old.id) && old.foreign_to(new.requester).is_none();
-        // What lies between stays where it is.
-        if old.group == Some(group) && free && frames[below + 1..at].iter().all(|between| !shares(old, between)) {
-            frames[at] = Arc::new(taken_over(old, new));
+        if old.group != Some(group) || !free {
+            continue;
+        }
+        // What lies between stays where it is, and has what it has written over what the old one had.
+        let lies_on = frames[below + 1..at].iter().any(|between| shares(old, between));
+        let hand = if lies_on { share::free(&frames[below..at], 0) } else { Some(HandOver::default()) };
+        if let Some(hand) = hand {
+            let old = rest_of(old, &hand);
+            share::hand_over(frames, &hand, &|id| id);
+            frames[at] = Arc::new(taken_over(&old, &frames[at]));
             frames.remove(below);
             at -= 1;
         }
     }
+}
+
+/// What is left of a frame that hands this over.
+fn rest_of(frame: &Arc<Frame>, hand: &HandOver) -> Arc<Frame> {
+    if hand.slots.is_empty() {
+        return frame.clone();
+    }
+    let given = |slot: Slot| hand.slots.contains(&slot);
+    let mut left = list(frame);
+    left.retain(|item| !item.may_stay().is_some_and(given));
+    let saved = frame.saved.iter().filter(|saved| !given(saved.slot)).cloned().collect();
+    let touches = frame.footprint.touches.iter().copied();
+    let touches = touches.filter(|touch| !given(touch.slot) && !touch.serves.is_some_and(given)).collect();
+    let (inverse, footprint) = (Inverse::List(Arc::new(left)), Arc::new(Footprint { touches }));
+    Arc::new(Frame { inverse, saved, footprint, ..(**frame).clone() })
 }
 
 /// A frame with what an older one did as well. What both have called is taken back once.

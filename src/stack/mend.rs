@@ -388,8 +388,9 @@ fn leads_on(step: &Step, system: &System) -> bool {
         }
         Step::Connect { from, to, .. } => member(*from) && member(*to) && !connected(*from, *to),
         Step::Disconnect { from, to } => connected(*from, *to),
-        Step::PropertySet { property: of, .. } | Step::PortWrite { port: of, .. } => member(*of),
-        Step::Destroy { component } => system.component(*component).is_some(),
-        Step::Operation(call) => system.component(call.operation.component).is_some(),
+        other => match absolute(other) {
+            Some(Slot::Property(of) | Slot::Port(of)) => member(of),
+            _ => system.component(other.component()).is_some(),
+        },
     }
 }

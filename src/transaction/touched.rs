@@ -1,6 +1,7 @@
 //! What safe configurations touched.
 
 use crate::model::{ComponentName, MemberRef, RunState, Step, Value, Wanted};
+use crate::plan::undo::absolute;
 use crate::stack::{Frame, calls};
 use crate::system::touch::{Slot, components, slot};
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -52,6 +53,15 @@ impl Touched {
     /// That is the frame that they leave: its calls are theirs, and only theirs.
     pub fn leaves(&mut self, frame: &Frame) {
         self.calls = calls(frame).collect();
+    }
+
+    /// These values were not written, for all that is known: the way back of what had written the same is open.
+    pub fn missed<'s>(&mut self, steps: impl Iterator<Item = &'s Step>) {
+        for slot in steps.filter_map(absolute) {
+            if !self.done.contains_key(&slot) {
+                self.slots.remove(&slot);
+            }
+        }
     }
 
     /// The same, with no frame that takes its calls back.

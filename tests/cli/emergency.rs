@@ -88,6 +88,63 @@ fn what_an_emergency_takes_the_place_of_is_expected_no_more() {
     }
 }
 
+/// An operator has set what the frame below has set as well: an emergency of its group that fails in part takes its place all the same.
+#[test]
+fn one_that_fails_in_part_takes_the_place_of_its_group_below_an_operators_frame() {
+    let demo = belt();
+    demo.replace(
+        "belt/configurations.yaml",
+        "      - port_write: { port: motor.speed, value: 0.4 }",
+        "      - port_write: { port: motor.speed, value: 0.4 }\n      - property_set: { property: motor.limit, value: 0.9 }",
+    );
+    let story = |fault: &str| {
+        format!(
+            "deploy('deployment.yaml')
+             local function tell(when)
+                 local frames = {{}}
+                 for _, frame in ipairs(stack()) do frames[#frames + 1] = frame.configuration end
+                 say(when .. ' ' .. tostring(port('motor.speed')) .. ' ' .. property('motor.limit') .. ' ' .. #drift() .. ' ' .. table.concat(frames, ' '))
+             end
+             raise('e_faster') wait_answer('fast.ok', 1) set('motor.limit', 0.7) wait_answer('motor.limit.ok', 1)
+             fault('{fault}', 'fail') raise('e_stop') wait_answer('stop.broken', 1) tell('stopped')
+             raise('e_reset') wait_answer('stop.undone', 1) tell('reset') undo() wait(1) tell('undone')
+             shutdown()"
+        )
+    };
+    for (fault, speed) in [("operation_call motor.brake", "0.0"), ("port_write motor.speed = 0.0", "0.4")] {
+        let told = said(&demo, &story(fault));
+        let stopped = format!("stopped {speed} 0.7 0 build run motor.limit stop");
+        assert_eq!(
+            told,
+            [stopped.as_str(), "reset nil 0.7 0 build run motor.limit", "undone nil 0.5 0 build run"],
+            "{fault}"
+        );
+    }
+}
+
+/// What an operator was setting when the emergency came is taken back where the emergency could not write the same.
+#[test]
+fn what_it_interrupts_is_taken_back_where_it_has_written_nothing() {
+    let demo = belt();
+    demo.replace("belt/configurations.yaml", "    safe: true\n    group: speed\n", "    safe: true\n");
+    demo.replace(
+        "belt/configurations.yaml",
+        "      - operation_call: { operation: motor.brake }",
+        "      - property_set: { property: motor.limit, value: 0.2 }\n      - operation_call: { operation: motor.brake }",
+    );
+    let story = |fault: &str| {
+        format!(
+            "deploy('deployment.yaml') raise('e_faster') wait_answer('fast.ok', 1)
+             {fault} set('motor.limit', 0.7)
+             raise('e_stop') wait_answer('motor.limit.failed', 1) wait(1) say('stopped ' .. property('motor.limit'))
+             raise('e_reset') wait_answer('stop.undone', 1) say('reset ' .. property('motor.limit') .. ' ' .. #drift())
+             shutdown()"
+        )
+    };
+    assert_eq!(said(&demo, &story("fault('property_set motor.limit = 0.2', 'fail')")), ["stopped 0.5", "reset 0.5 0"]);
+    assert_eq!(said(&demo, &story("")), ["stopped 0.2", "reset 0.5 0"]);
+}
+
 #[test]
 fn who_lets_go_of_one_unasked_is_told() {
     let lets_go = |from: &str, to: &str| {

@@ -182,6 +182,10 @@ fn configurations_in_lua() {
         ("'A:stopped'", "'_default:stopped'", "conf::default_twice 4:45", "keep one"),
         ("pre_conf_state", "pre_conf_sate", "text::unknown_key 4:5", "`pre_conf_state`"),
         ("create(", "crate(", "lua::undefined 5:5", "`create`"),
+        // The word that others would say.
+        ("connect(\"A.y\"", "set(\"A.y\"", "lua::undefined 6:5", "did you mean `property_set`"),
+        ("connect(\"A.y\"", "call(\"A.y\"", "lua::undefined 6:5", "did you mean `operation_call`"),
+        ("connect(\"A.y\"", "write(\"A.y\"", "lua::undefined 6:5", "did you mean `port_write`"),
         ("\"Gain\"", "\"Ga in\"", "text::bad_name 5:17", "youbot.Dynamics"),
         ("activity =", "activty =", "text::unknown_key 5:27", "`activity`"),
         ("properties =", "propertys =", "text::unknown_key 5:49", "`properties`"),
@@ -244,6 +248,12 @@ fn configurations_in_yaml() {
         ("\"A:stopped\"", "\"_default:stopped\"", "conf::default_twice 5:43", "keep one"),
         ("- create:", "- crate:", "conf::unknown_change 7:9", "`create`"),
         ("component: A", "compnent: A", "text::unknown_key 7:19", "`component`"),
+        (
+            "- create: {",
+            "- create:\n        component: A\n      - create: {",
+            "conf::unknown_change 8:9",
+            "`component` belongs to `create`",
+        ),
         ("k: 1.0", "k-1: 1.0", "text::bad_name 7:78", "friction_comp"),
         ("from: A.y", "from: Ay", "text::bad_name 8:26", "Component.member"),
         ("buffer: 8", "bufer: 8", "text::unknown_key 8:50", "`buffer`"),
@@ -323,6 +333,22 @@ fn coordinators() {
         lang::load_coordinator(&Sources::memory([("k.yaml", text)]), Path::new("k.yaml"), &LoadOptions::default());
     let found: Vec<_> = loaded.findings.iter().map(|f| f.code.0).collect();
     assert_eq!(found, ["text::unknown_key", "text::unknown_key"], "all findings, not the first");
+    let text = text.replace("confg: up", "entry: e_x").replace("target: idle", "tgt: idle, guard: \"A.y > 1\"");
+    let loaded =
+        lang::load_coordinator(&Sources::memory([("k.yaml", &*text)]), Path::new("k.yaml"), &LoadOptions::default());
+    let told: Vec<_> = loaded.findings.iter().map(|f| (f.code.0, f.help.clone().unwrap_or_default())).collect();
+    assert!(
+        matches!(&told[..], [("text::wrong_type", help)] if help.contains("let a monitor raise an event")),
+        "{told:?}"
+    );
+    // A coordinator's file among the configurations.
+    let loaded =
+        load(&[("d.yaml", &DEPLOYMENT.replace("c.lua", "k.yaml")), ("k.yaml", &text)], &LoadOptions::default());
+    let told = loaded.findings.first().and_then(|f| f.help.clone()).unwrap_or_default();
+    assert!(
+        told.contains("name this file under `coordinator` in the deployment, and not under `configurations`"),
+        "{told}"
+    );
 }
 
 /// Only functions have a host, and only Lua has functions.

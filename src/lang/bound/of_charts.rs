@@ -116,12 +116,14 @@ impl WrittenValue for Vec<(ConfigId, Origin)> {
 /// A function in a chart: its place is known, its meaning comes later.
 pub fn function(cx: &mut Cx, node: &Node, what: &str) {
     if !matches!(node.kind, Kind::Function) {
-        cx.wrong(
-            node,
-            what,
-            "a function (names of events stand in `entry`, `exit` and `effect`)",
-            "entry = \"e_ready\"",
-        );
+        let expected = "a function (names of events stand in `entry`, `exit` and `effect`)";
+        if cx.is_lua(node.origin) {
+            return cx.wrong(node, what, expected, "entry = \"e_ready\"");
+        }
+        // There are none in YAML.
+        let instead =
+            "let a monitor raise an event where that is so (`monitors:` in the deployment), and hear it in `events`";
+        cx.wrong_so(node, what, expected, instead);
         return;
     }
     let message = format!("{what} is a function, and a coordinator that is not trusted must be pure");

@@ -144,14 +144,24 @@ fn change(cx: &mut Cx, node: Node) -> Option<Change> {
             (primitive.object.name, Fields::of(cx, value, primitive.object)?)
         }
         Kind::Map(entries) if entries.len() > 1 => {
+            let (first, second) = (&entries[0], &entries[1]);
+            // A field of the first that is not indented any further.
+            let field = primitive_of(&first.key).filter(|first| first.object.key(&second.key).is_some());
+            let help = match field.filter(|_| primitive_of(&second.key).is_none()) {
+                Some(_) => format!(
+                    "`{}` belongs to `{}`: write it further in than that, or in braces behind it: `- {}: {{ {}: … }}`",
+                    second.key, first.key, first.key, second.key
+                ),
+                None => format!("begin each change with its own `-`: `{EXAMPLE}`"),
+            };
             cx.report(
                 Finding::error(
                     codes::CONF_UNKNOWN_CHANGE,
                     "an entry of `changes` is one change, this has several keys",
                 )
-                .at(entries[1].origin)
+                .at(second.origin)
                 .labelled("a second one")
-                .help(format!("begin each change with its own `-`: `{EXAMPLE}`")),
+                .help(help),
             );
             return None;
         }
