@@ -89,8 +89,7 @@ impl Transaction {
         let also = self.failures().into_iter().filter(|reason| *reason != cause).collect();
         let unsettled = self.unsettled.clone();
         let residual = Residual { left, also, unsettled, quarantined: self.hung(can), ..Residual::of(cause) };
-        let own = self.own();
-        let broken = self.broken(0, residual, live.snapshot_some(&own), false, live);
+        let broken = self.broken(0, residual, false, live);
         self.over(vec![broken]);
     }
 
@@ -305,31 +304,31 @@ impl Transaction {
         let mut parts: Vec<PartEnd> = Vec::with_capacity(self.planned.parts.len());
         for (at, _) in self.planned.parts.iter().enumerate() {
             parts.push(if finishing && at + 1 == part {
-                self.broken(at, residual.clone(), wanted.snapshot_some(&own), whole, wanted)
+                self.broken(at, residual.clone(), whole, wanted)
             } else if finishing && at == part {
                 self.taken_back_whole(at)
             } else if at < part {
                 if missing.contains(&at) {
-                    self.broken(at, Residual::of(self.reason()), Snapshot::default(), false, wanted)
+                    self.broken(at, Residual::of(self.reason()), false, wanted)
                 } else {
                     PartEnd::Done
                 }
             } else if self.broken_off {
                 match at == blamed && !clean {
-                    true => self.broken(at, residual.clone(), wanted.snapshot_some(&own), whole, wanted),
-                    false if left.contains(&at) => self.broken(at, own_left(at), Snapshot::default(), whole, wanted),
+                    true => self.broken(at, residual.clone(), whole, wanted),
+                    false if left.contains(&at) => self.broken(at, own_left(at), whole, wanted),
                     false => self.broken_whole(residual.observed),
                 }
             } else if !clean && self.interrupted {
                 match at == blamed {
-                    true => self.broken(at, residual.clone(), wanted.snapshot_some(&own), whole, wanted),
-                    false if left.contains(&at) => self.broken(at, own_left(at), Snapshot::default(), whole, wanted),
+                    true => self.broken(at, residual.clone(), whole, wanted),
+                    false if left.contains(&at) => self.broken(at, own_left(at), whole, wanted),
                     false => self.taken_back_whole(at),
                 }
             } else if at == part {
                 match clean {
                     true => self.taken_back_whole(at),
-                    false => self.broken(at, residual.clone(), wanted.snapshot_some(&own), whole, wanted),
+                    false => self.broken(at, residual.clone(), whole, wanted),
                 }
             } else if self.interrupted || self.taken_down {
                 self.taken_back_whole(at)
@@ -404,7 +403,7 @@ impl Transaction {
 
     /// A part that is neither done nor taken back. `whole`: going to `expected` takes all of it back, and its frame has
     /// nothing to add to that.
-    fn broken(&self, part: usize, residual: Residual, expected: Snapshot, whole: bool, wanted: &System) -> PartEnd {
+    fn broken(&self, part: usize, residual: Residual, whole: bool, wanted: &System) -> PartEnd {
         let planned = &self.planned.parts[part];
         let undone = planned.pushes.is_none();
         let items: Vec<DraftStep> = if whole && !undone {
@@ -417,6 +416,9 @@ impl Transaction {
         // A safe configuration that is being undone demands nothing any more of what is back, and perhaps broken.
         let demands = !(undone && planned.frame.as_ref().is_some_and(|frame| frame.safe));
         let left: FxHashSet<ComponentName> = residual.components().filter(|_| demands).collect();
+        // With what is connected to one of its own, and differs in that.
+        let about: Vec<ComponentName> = self.own().into_iter().chain(residual.components()).collect();
+        let expected = wanted.snapshot_some(&about);
         let irreversible = residual.irreversible.first().cloned();
         let floor = irreversible.map(|step| format!("`{step}` cannot be undone"));
         let frame = planned.frame.as_deref().map(|frame| {

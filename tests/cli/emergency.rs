@@ -4,7 +4,7 @@ use crate::demo::Demo;
 use serde_json::Value as Json;
 
 /// What `davit new` writes, in YAML.
-fn belt() -> Demo {
+pub fn belt() -> Demo {
     let demo = Demo::new();
     let new = demo.run(&["new", "belt"]);
     assert_eq!(new.code, 0, "{}{}", new.out, new.err);
@@ -12,7 +12,7 @@ fn belt() -> Demo {
 }
 
 /// What a script says of it, on the simulated clock.
-fn said(demo: &Demo, script: &str) -> Vec<String> {
+pub fn said(demo: &Demo, script: &str) -> Vec<String> {
     demo.write("belt/own.lua", script);
     let ran = demo.run(&["run", "belt/own.lua", "--clock", "simulated", "--quiet"]);
     assert_eq!(ran.code, 0, "{}{}", ran.out, ran.err);

@@ -1,6 +1,7 @@
 //! A platform that says *done* and does nothing, while a safe configuration is in force: who wrote it is told, and its undo
 //! leads out.
 
+use crate::emergency::{belt, said};
 use crate::motion::{BUILT, run, steps};
 
 /// `c` is there and stopped.
@@ -87,4 +88,32 @@ fn what_came_late_and_did_not_go_back_is_tried_again_and_told() {
         undo('build', {{force = true}}) wait_answer('build.undone', 1)",
         script(2)
     ));
+}
+
+/// A connection that was not taken away, though the platform had said so, is a difference of both its ends: who recovers takes that away, and
+/// what is at its other end stays as it is.
+#[test]
+fn what_is_at_the_other_end_of_a_connection_is_not_taken_away_by_who_recovers() {
+    let demo = belt();
+    demo.replace(
+        "belt/deployment.yaml",
+        "      speed: { direction: in, type: float, unit: m/s }",
+        "      speed: { direction: in, type: float, unit: m/s }\n      past: { direction: out, type: float, unit: m/s }\n      near: { direction: in, type: float, unit: m/s }",
+    );
+    demo.replace(
+        "belt/configurations.yaml",
+        "  run:\n",
+        "  beside: { changes: [{ create: { component: aux, type: Motor } }] }\n  wire: { changes: [{ connect: { from: motor.past, to: aux.near } }] }\n  parked: { post_conf_state: [\"motor:stopped\"] }\n  run:\n",
+    );
+    let story = "deploy('deployment.yaml')
+        local function tell(when) say(when .. ' ' .. state('motor') .. ' ' .. tostring(state('aux')) .. ' ' .. #system().connections .. ' ' .. #drift()) end
+        local function put(name) apply(name, {force = true}) wait_answer(name .. '.ok', 1) end
+        put('beside') put('wire') fault('disconnect motor.past', 'lie', 2) undo('wire', {force = true}) wait_answer('wire.undone', 1)
+        fault('stop motor', 'lie') put('parked') undo('parked', {force = true}) wait_answer('parked.undo.broken', 1) tell('broken')
+        recover('back') tell('recovered')";
+    let told = said(&demo, story);
+    let told: Vec<&String> =
+        told.iter().filter(|line| line.starts_with("broken") || line.starts_with("recovered")).collect();
+    assert!(told[0].starts_with("broken stopped unconfigured 1 "), "{told:?}");
+    assert_eq!(told[1], "recovered stopped unconfigured 0 0");
 }
