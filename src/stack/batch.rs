@@ -262,8 +262,11 @@ fn resolve<'a>(
             if !may_apply(request, configuration, rules.operator) {
                 return tell(failed, Reason::NotListed(id));
             }
+            // What it would take the place of is undone with it, and is what only that undo repairs.
+            let of_group = |f: &&Arc<super::Frame>| f.group.is_some() && f.group == configuration.group && !f.safe;
+            let undone = || work.frames.iter().rev().find(of_group).map(|frame| share::components(&frame.footprint));
             if !world.broken.is_empty()
-                && let Some(reason) = still_broken(&mut touched(configuration))
+                && let Some(reason) = still_broken(&mut touched(configuration).chain(undone().into_iter().flatten()))
             {
                 return tell(failed, reason);
             }

@@ -110,10 +110,30 @@ fn what_is_at_the_other_end_of_a_connection_is_not_taken_away_by_who_recovers() 
         local function put(name) apply(name, {force = true}) wait_answer(name .. '.ok', 1) end
         put('beside') put('wire') fault('disconnect motor.past', 'lie', 2) undo('wire', {force = true}) wait_answer('wire.undone', 1)
         fault('stop motor', 'lie') put('parked') undo('parked', {force = true}) wait_answer('parked.undo.broken', 1) tell('broken')
-        recover('back') tell('recovered')";
+        recover('back') tell('recovered') for _ = 1, 3 do undo() wait(1) end shutdown()";
     let told = said(&demo, story);
     let told: Vec<&String> =
         told.iter().filter(|line| line.starts_with("broken") || line.starts_with("recovered")).collect();
     assert!(told[0].starts_with("broken stopped unconfigured 1 "), "{told:?}");
     assert_eq!(told[1], "recovered stopped unconfigured 0 0");
+}
+
+/// What takes the place of another one of its group undoes that: not where something of that is broken, also where it names nothing of it itself.
+#[test]
+fn nothing_takes_the_place_of_what_is_broken() {
+    let demo = belt();
+    demo.replace(
+        "belt/configurations.yaml",
+        "  run:\n",
+        "  beside: { changes: [{ create: { component: aux, type: Motor } }] }\n  parked: { group: place, post_conf_state: [\"motor:stopped\"] }\n  aside: { group: place, changes: [{ property_set: { property: aux.limit, value: 0.7 } }] }\n  run:\n",
+    );
+    let story = "deploy('deployment.yaml')
+        local function tell(when) say(when .. ' ' .. state('motor') .. ' ' .. property('aux.limit') .. ' ' .. #stack() .. ' ' .. #drift()) end
+        local function put(name) apply(name, {force = true}) wait_answer(name .. '.ok', 1) end
+        put('beside') put('parked') fault('property_set motor.limit', 'lie') set('motor.limit', 0.7) wait(6) tell('lied')
+        apply('aside', {force = true}) wait_answer('aside.failed', 1) tell('refused')
+        recover('back') put('aside') tell('recovered') for _ = 1, 4 do undo() wait(1) end shutdown()";
+    let told = said(&demo, story);
+    let told: Vec<&String> = told.iter().filter(|line| !line.contains("note ")).collect();
+    assert_eq!(told[..3], ["lied stopped 0.5 6 1", "refused stopped 0.5 6 1", "recovered running 0.7 6 0"]);
 }
