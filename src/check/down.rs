@@ -50,6 +50,8 @@ impl Graph<'_, '_> {
             let some: Vec<u32> = all.iter().copied().filter(|at| stuck.contains(at)).collect();
             if some.is_empty() { all } else { some }
         } else {
+            let unbegun = self.states.iter().filter(|state| self.product.waits_for_unbegun(state, 0).is_some());
+            let leaves: FxHashSet<&[NodeId]> = unbegun.map(|state| &state.leaves[..]).chain(leaves).collect();
             all.into_iter().filter(|at| !leaves.contains(&self.states[*at as usize].leaves[..])).collect()
         };
         let Some(at) = self.best_first(some).first().copied() else {
@@ -58,6 +60,7 @@ impl Graph<'_, '_> {
             return self.failing(&comes_up, told, found);
         };
         let deployment = self.product.deployment;
+        let help = self.leads_nowhere(at);
         let state = &self.states[at as usize];
         let finding = if let Some(finding) = self.is_down_alone(state) {
             finding
@@ -77,10 +80,25 @@ impl Graph<'_, '_> {
                 .at(member.chart.origin(leaf))
                 .path(format!("coordinator.{fqn}"))
                 .also(deployment.key_origin("shutdown.down"), "the state that means down")
-                .help("add transitions that lead down from there")
+                .help(help)
         };
         let trace = self.trace(at);
         found.push((finding, trace));
+    }
+
+    /// What to do about a state from which no way leads down: what ends the deployment may lead on from there, to nowhere.
+    fn leads_nowhere(&mut self, at: u32) -> String {
+        let (leaf, shutdown) = (self.states[at as usize].leaves[0], self.product.deployment.shutdown.event);
+        let member = &mut self.product.members[0];
+        let event = member.chart.event(shutdown);
+        let then = member.react(leaf, event).leaf;
+        match event != EventId::OTHER && then != leaf {
+            true => format!(
+                "`{shutdown}` leads to `{}` from there: see that what is waited for from there on comes",
+                member.chart.fqn(then)
+            ),
+            false => "add transitions that lead down from there".to_owned(),
+        }
     }
 
     /// From which states such edges lead to *down*, or to where it is not followed, or to nothing that is known.

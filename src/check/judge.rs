@@ -33,6 +33,7 @@ impl Graph<'_, '_> {
         self.growing(&mut found);
         self.unhandled(&mut found);
         self.endless(&mut found);
+        self.unbegun(&mut found);
         let stuck = self.stuck(&mut found);
         self.leftovers(&mut found);
         self.ways_down(&stuck, &mut found);
@@ -41,6 +42,7 @@ impl Graph<'_, '_> {
         self.promises(&mut found);
         self.let_go_in_vain(&mut found);
         self.exclusives(&mut found);
+        self.races(&mut found);
         self.exports_stay(&mut found);
         found
     }
@@ -451,7 +453,7 @@ impl Graph<'_, '_> {
         for at in self.best_first(stuck.iter().copied().collect()) {
             let leaves = self.states[at as usize].leaves.to_vec();
             let leaf = leaves[0];
-            if told.insert(leaves) {
+            if self.product.waits_for_unbegun(&self.states[at as usize], 0).is_none() && told.insert(leaves) {
                 let finding = self.product.nothing_leads_on(leaf);
                 let finding = self.told_before(leaf).into_iter().fold(finding, Finding::help);
                 let trace = self.trace(at);

@@ -14,8 +14,8 @@ use super::state::Failed;
 use super::verdict::CheckVerdict;
 use super::{
     alone, composed, configurations as single, coordinator, coupling, declared, interface, led_on, lets_go, library,
-    monitors as watched, paths, purity, safety, settings, simulated, slips, types, undriven, unhandled, universe,
-    unwatched, ways,
+    monitors as watched, paths, purity, safety, settings, simulated, slips, types, unasked, undriven, unhandled,
+    universe, unwatched, ways,
 };
 use crate::model::codes::{CLASH, POST_ON_DESTROYED, PRE_ON_CREATED, TOUCHES_DESTROYED};
 use crate::model::{
@@ -88,6 +88,7 @@ fn run_one(
         if deployment.own.is_none() {
             findings.extend(interface::between(deployment, &charts, catalogue));
             findings.extend(paths::heard(deployment, &charts));
+            findings.extend(unasked::check(deployment, &charts));
         }
         let of = |number| coupling::view(deployment, &charts, number);
         let views: Vec<Deployment> = (0..all).filter_map(of).collect();

@@ -18,6 +18,7 @@ pub const FOLLOWED: &[Code] = &[
     COORD_LEFTOVERS,
     COORD_NO_WAY_DOWN,
     COORD_SAFETY_UNHEARD,
+    COORD_RACED,
     // The bring-up and the shutdown.
     DEPLOY_NEVER_UP,
     DEPLOY_BY_HAND,
@@ -69,6 +70,7 @@ pub const READ: &[(&str, &[Code])] = &[
             COMPOSE_UNKNOWN,
             COMPOSE_SAFETY,
             COMPOSE_NOT_DOWN_AT_FIRST,
+            COMPOSE_UNBEGUN,
             COMPOSE_WORD,
             COMPOSE_EXPORT_DRIVEN,
             COMPOSE_EXCLUSIVE,
@@ -92,6 +94,7 @@ pub const READ: &[(&str, &[Code])] = &[
             CONF_HOLDS_UNSEEN,
             CONF_SAFE_LETS_GO,
             CONF_ALONE_IN_GROUP,
+            CONF_UNASKED,
             CHANGE_TWICE,
             DEPLOY_SAFETY_ANSWER,
             DEPLOY_UNKNOWN_CONFIGURATION,

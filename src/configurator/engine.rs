@@ -459,13 +459,19 @@ impl Engine {
         let stack = &self.world.stack;
         self.partials.retain(|(frame, _)| stack.frame(*frame).is_some_and(|frame| frame.partial));
         let broken = self.world.broken.first().map(|broken| &broken.residual);
-        broken.or(self.partials.first().map(|(_, residual)| residual)).cloned()
+        broken.or(self.in_part().next().map(|(_, residual)| residual)).cloned()
     }
 
     /// What partial frames hold that nothing else tells of.
     fn left_partial(&self) -> Vec<super::request::Residual> {
         let told = |frame: &FrameId| self.world.broken.iter().any(|broken| broken.frame == Some(*frame));
-        let left = self.partials.iter().filter(|(frame, _)| !told(frame));
+        let left = self.in_part().filter(|(frame, _)| !told(frame));
         left.map(|(_, residual)| residual.of_partial(&self.world.system)).collect()
+    }
+
+    /// What is only in part in force, oldest first, with what is left of it.
+    pub(super) fn in_part(&self) -> impl Iterator<Item = &(FrameId, Arc<super::request::Residual>)> {
+        let stack = &self.world.stack;
+        self.partials.iter().filter(|(frame, _)| stack.frame(*frame).is_some_and(|frame| stack.is_in_part(frame)))
     }
 }

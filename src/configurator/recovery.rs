@@ -105,7 +105,7 @@ impl Engine {
 
     /// Recovers what is broken; the error is what remains.
     pub(super) fn recover(&mut self, direction: Recovery) -> Result<(), Arc<Residual>> {
-        let partial = self.world.stack.frames().iter().any(|frame| frame.partial);
+        let partial = self.world.stack.frames().iter().any(|frame| self.world.stack.is_in_part(frame));
         if self.world.broken.is_empty() && !partial {
             return Ok(());
         }
@@ -141,13 +141,14 @@ impl Engine {
             // Of what is only in part in force nothing else is known.
             _ => {
                 let broken = self.world.broken.first().map(|broken| &broken.residual);
-                let left = broken.or_else(|| self.partials.first().map(|(_, residual)| residual));
+                let left = broken.or_else(|| self.in_part().next().map(|(_, residual)| residual));
                 Err(left.cloned().unwrap_or_else(|| Arc::new(Residual::of(Reason::Busy))))
             }
         }
     }
 
-    /// Goes back to the system before whatever ended *broken*: what differs is mended, what is partial undone.
+    /// Goes back to the system before whatever ended *broken*: what differs is mended, what is partial undone. What is safe stays as far
+    /// as it came: it holds something that is let go by its own undo, and not by who puts a trouble right.
     fn recover_back(&mut self) -> Result<(), Arc<Residual>> {
         let mut some = false;
         loop {
@@ -155,12 +156,13 @@ impl Engine {
             if let Some(at) = self.world.broken.len().checked_sub(1) {
                 some = true;
                 match self.partial_of(at) {
-                    Some(frame) if self.read_broken(at) && self.take_back_straight(at, &frame)? => {}
+                    Some(frame) if !frame.safe && self.read_broken(at) && self.take_back_straight(at, &frame)? => {}
                     _ => self.repair(at, By::Recovery)?,
                 }
                 continue;
             }
-            let Some(frame) = self.world.stack.frames().iter().rev().find(|frame| frame.partial).cloned() else {
+            let partial = |frame: &&Arc<Frame>| frame.partial && !frame.safe;
+            let Some(frame) = self.world.stack.frames().iter().rev().find(partial).cloned() else {
                 break;
             };
             some = true;
@@ -173,7 +175,14 @@ impl Engine {
         if some && let Some(progress) = &self.given.progress {
             progress(&Progress::Recovered);
         }
-        Ok(())
+        let stays = self.world.stack.frames().iter().rev().find(|frame| self.world.stack.is_in_part(frame));
+        stays.map_or(Ok(()), |frame| Err(self.left_of(frame, Reason::StaysSafe(frame.configuration))))
+    }
+
+    /// What is left in a partial frame, and why it still is.
+    fn left_of(&self, frame: &Frame, cause: Reason) -> Arc<Residual> {
+        let left = self.partials.iter().find(|(id, _)| *id == frame.id).map(|(_, left)| (**left).clone());
+        Arc::new(Residual { cause: cause.clone(), ..left.unwrap_or(Residual::of(cause)) })
     }
 
     /// A person has decided that what cannot be undone may stay.
@@ -214,10 +223,7 @@ impl Engine {
                 self.changed();
                 Ok(())
             }
-            Some(PartEnd::Failed(reason)) => {
-                let left = self.partials.iter().find(|(id, _)| *id == frame.id).map(|(_, left)| (**left).clone());
-                Err(Arc::new(Residual { cause: reason.clone(), ..left.unwrap_or(Residual::of(reason)) }))
-            }
+            Some(PartEnd::Failed(reason)) => Err(self.left_of(frame, reason)),
             Some(PartEnd::Broken(part)) => {
                 let residual = part.residual.clone();
                 let ask = crate::model::Ask::UndoOf(frame.configuration);

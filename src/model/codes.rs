@@ -198,6 +198,10 @@ codes! {
         "A deployment is down when all its coordinators are, those of its subsystems too. A subsystem that does not begin in the state that its file \
          names in `shutdown: { down }` is not down before it is begun, or ended: a parent that comes to where it is down without either is stopped \
          without its coordinator. Let the subsystem begin in that state, or let its parent end it on every way down, also where it was not begun.";
+    COMPOSE_UNBEGUN = "compose::unbegun", "nobody begins a subsystem",
+        "A subsystem is begun by the event that its file names in `deploy: { event }`, raised by a coordinator of its parent with the subsystem's \
+         name before it (`left/e_start`). No coordinator raises that of this one: it is never there, what it exports neither, and nothing of \
+         its file ever runs. Raise the event in the bring-up and wait for `left/up`, or leave the subsystem out.";
     COMPOSE_SAFETY = "compose::safety", "a safety event does not reach a subsystem with actuators",
         "A safety event is given at once to every subsystem, to any depth, that declares one of the same name under `safety`. This \
          one has actuators and none of that name, so it would move on through an emergency. Declare it there, and let it lead to a safe \
@@ -338,6 +342,10 @@ codes! {
         "Configurations of one `group` are alternatives: applying one replaces the frame of the one that is in force. This group has \
          only one configuration, which replaces nothing, and another group has nearly the same name: one of both is misspelt, as it \
          seems. Correct it, or leave the group out.";
+    CONF_UNASKED = "conf::unasked", "nobody asks for a configuration",
+        "No state and no transition of a coordinator asks for this configuration, it is not safe, brings nothing to rest (`shutdown: { rest }`), \
+         and `operator:` does not list it. It can only be applied by force (`davit apply --force`), of which `check` knows nothing. Ask for it, \
+         list it where people apply it, or delete it; a name that is misspelt elsewhere is told by a finding of its own.";
     UNKNOWN_COMPONENT = "conf::unknown_component", "there is no such component",
         "The configuration names a component that does not exist where it is applied: it was never created, was destroyed, or its name is misspelt. Nothing can be done to it. Create it earlier (or in the same configuration), or correct the name.";
     UNKNOWN_TYPE = "conf::unknown_type", "there is no such component type",
@@ -679,10 +687,16 @@ codes! {
     COORD_SHARED = "coord::shared", "two coordinators touch the same component",
         "The configurations of one coordinator touch a component that those of another touch, or one that an operator may apply \
          touches what both touch. At run time one of them may be \
-         refused something because of the other's frames (nothing is broken by that: a conflict is refused and named). The \
+         refused something because of the other's frames (nothing is broken by that: it is refused and named), and of two that write the same \
+         property or port the later one holds. The \
          coordinators are followed together; what comes of it is told by findings of its own, and this is a note. Where they \
          were not followed to the end, it is a warning. Give each coordinator components of its own, or let one coordinator \
          ask the other by an event.";
+    COORD_RACED = "coord::raced", "two coordinators write the same at once, with different values",
+        "One event has two coordinators ask for configurations that write the same property or port, with different values. Neither is \
+         refused, for a value that is written bars nobody, and both are applied one after the other: which of them is the later one, and \
+         holds, depends on which coordinator is quicker. Let one of them ask for it and tell the other by an event (`emits`), or let one wait for \
+         what the other one tells.";
     COORD_REFUSED_BY_OTHER = "coord::refused_by_other", "one coordinator is refused something because of another's frames",
         "Coordinators side by side were followed together, and one of them is refused something because frames of those named \
          are in the way: they share a component or a group with it, and without them it would not be refused. Nothing is \

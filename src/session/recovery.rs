@@ -24,6 +24,8 @@ pub struct Difference {
 enum How {
     /// The step leads from what should be to what is.
     Differs,
+    /// The step was done and not taken back; what is in force in part has it.
+    Left,
     /// Nobody knows whether the step happened.
     Unknown,
     /// The step happened, and nothing undoes it.
@@ -53,6 +55,7 @@ impl Difference {
         let text = match how {
             How::Unknown => format!("{step} (nobody knows whether it happened)"),
             How::Irreversible => format!("{step} (cannot be undone)"),
+            How::Left => format!("{step} (done, and not taken back)"),
             _ => step.to_string(),
         };
         Self { how, what: DifferenceIn::Step(step.clone()), text }
@@ -78,11 +81,11 @@ impl Difference {
         let residuals = view.residuals.iter().map(|residual| &**residual).chain(&view.partial);
         let mut all: Vec<Self> = Vec::new();
         let quarantined = view.quarantined.iter().map(|name| Self::component(How::Quarantined, *name));
-        let missing = view.partial.iter().filter(|residual| residual.is_empty()).map(|residual| {
+        let missing = view.partial.iter().map(|residual| {
             let text = format!("not done: {}", residual.cause);
             Self { how: How::Missing, what: DifferenceIn::Nothing {}, text }
         });
-        for one in residuals.flat_map(Self::of_residual).chain(quarantined).chain(missing) {
+        for one in missing.chain(residuals.flat_map(Self::of_residual)).chain(quarantined) {
             // A call that was out then may have come back since.
             let back = |name: &ComponentName| one.how == How::Quarantined && !view.quarantined.contains(name);
             let over = matches!(&one.what, DifferenceIn::Component { target } if back(target));
@@ -101,7 +104,7 @@ impl Difference {
             (How::Irreversible, &residual.irreversible),
         ];
         let left = residual.left.iter().filter(|step| !residual.irreversible.contains(step));
-        let left = left.map(|step| Self::step(How::Differs, step));
+        let left = left.map(|step| Self::step(How::Left, step));
         let steps = lists.into_iter().flat_map(|(how, steps)| steps.iter().map(move |step| Self::step(how, step)));
         let components = [(How::Faulted, &residual.faulted), (How::Quarantined, &residual.quarantined)];
         let components =

@@ -13,7 +13,7 @@ use std::time::Duration;
 
 /// The way out of *broken*, as it is told wherever something is.
 pub const WAY_OUT: &str = "`davit undo ID` takes back what is left of that configuration (with `--force` where a coordinator \
-                           asked for it), `davit recover --back` all that is; \
+                           asked for it), `davit recover --back` all that is but for what is safe; \
                            `davit recover --accept` takes what is there as the state; `davit drift` shows what differs";
 
 /// The answer to a request. Every request gets exactly one; a later `Verdict::Reverted` (or an undo verdict in its
@@ -79,6 +79,8 @@ pub enum Reason {
     GivenUp,
     /// A `safe` configuration was asked for while it waited.
     SafeCame(ConfigId),
+    /// It is safe, in force in part, and not taken back by who recovers.
+    StaysSafe(ConfigId),
     /// It would move something while a `safe` configuration is in force.
     Moves(Step),
     /// Something would move that nobody asked to move.
@@ -273,6 +275,7 @@ impl Reason {
             Self::GivenUp => Finding::info(codes::GIVEN_UP, self.to_string()),
             Self::SafeCame(_) => Finding::error(codes::INTERRUPTED, self.to_string())
                 .help("ask again when the safe configuration is no longer needed"),
+            Self::StaysSafe(_) => Finding::error(codes::STILL_BROKEN, self.to_string()).help(WAY_OUT),
             Self::Moves(_) => Finding::error(codes::MOVES_WHILE_SAFE, self.to_string()).help(
                 "let the coordinator ask for it in a later step, when it is meant to move again; an operator says `--force`",
             ),
@@ -326,6 +329,11 @@ impl fmt::Display for Reason {
             Self::Overtaken => f.write_str("overtaken by its own undo before it began"),
             Self::GivenUp => f.write_str("given up: its undo was asked for"),
             Self::SafeCame(by) => write!(f, "the safe configuration `{by}` was asked for while it waited"),
+            Self::StaysSafe(id) => write!(
+                f,
+                "`{id}` is safe and stays in force as far as it came: `davit apply {id}` applies it anew, `davit undo {id}` lets it go \
+                 (with `--force` where a coordinator asked for it)"
+            ),
             Self::Moves(step) => write!(f, "`{step}` moves, and a safe configuration is in force"),
             Self::MovesUnasked(step) => write!(f, "`{step}` moves, and nobody asked for that"),
             Self::Busy => f.write_str("requests are under way that it would meddle with"),

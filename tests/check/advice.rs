@@ -317,6 +317,22 @@ fn an_event_that_nobody_can_mean_is_told() {
     assert!(texts(&check(more, ""), "coord::near_event").is_empty());
 }
 
+/// What no coordinator asks for and no operator is expected to is a note, one for all.
+#[test]
+fn what_nobody_asks_for_is_told_once() {
+    let noted = |keys: &str| {
+        let said = check("", keys);
+        let told = said.of("conf::unasked").into_iter();
+        told.map(|f| (f["severity"].as_str().unwrap().to_owned(), f["message"].as_str().unwrap().to_owned()))
+            .collect::<Vec<_>>()
+    };
+    let (severity, message) = &noted("operator: [run, service]")[0];
+    let whole = "`soft`, `other`, `gone`, `halt`: no coordinator asks for them, and `operator:` does not list them";
+    assert_eq!((severity.as_str(), message.as_str()), ("info", whole));
+    assert!(noted("")[0].1.starts_with("`soft`, `other`, `gone`, `halt` and 2 more: "), "{:?}", noted(""));
+    assert!(noted("operator: [soft, other, gone, halt, run, service]").is_empty());
+}
+
 /// What is written nearly as an answer, or as what a subsystem tells, is told as that.
 #[test]
 fn what_is_no_answer_and_no_event_is_told_as_what_was_meant() {

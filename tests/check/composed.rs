@@ -228,6 +228,47 @@ fn each_file_is_followed_alone_and_their_product_never() {
     assert!(told("coord::failure_unhandled") <= unhandled + 2, "{:#?}", together.findings);
 }
 
+/// A subsystem is begun by a coordinator of its parent, or never.
+#[test]
+fn a_subsystem_that_nobody_begins_is_warned_of() {
+    let more = [("pair.yaml", "  right: {", "  spare: { deployment: arm.yaml }\n  right: {")];
+    let unbegun = |changes: &[(&str, &str, &str)]| {
+        let all = found(changes).into_iter().filter(|finding| finding.code.0 == "compose::unbegun");
+        all.map(|finding| (finding.severity, finding.message)).collect::<Vec<_>>()
+    };
+    assert_eq!(unbegun(&[]), []);
+    let told = "nobody begins `spare`: no coordinator raises `spare/e_start`".to_owned();
+    assert_eq!(unbegun(&more), [(Severity::Warning, told)]);
+}
+
+/// A parent that ends a subsystem where it has not begun it waits in vain to hear that it is down, and is told what comes instead.
+#[test]
+fn who_ends_what_was_not_begun_is_told_to_hear_that_this_is_ignored() {
+    let late = |waits: &str| {
+        let waits = format!("tgt = 'idle', events = {{ {waits} }}");
+        let changes = [
+            ("pair.yaml", "coordinator: pair.lua", "coordinator: lead.lua"),
+            ("pair.yaml", "up: coupled", "up: on"),
+            (
+                "lead.lua",
+                "  trans { src = 'idle', tgt = 'raising', events = { 'e_start' } },",
+                "  waiting = state {}, trans { src = 'idle', tgt = 'waiting', events = { 'e_start' } },
+                 trans { src = 'waiting', tgt = 'raising', events = { 'e_go' } },
+                 trans { src = 'waiting', tgt = 'lowering', events = { 'e_shutdown' } },",
+            ),
+            ("lead.lua", "tgt = 'idle', events = { 'left/down' }", waits.as_str()),
+        ];
+        let stuck = found(&changes).into_iter().filter(|finding| finding.code.0 == "coord::stuck");
+        stuck.map(|finding| (finding.message, finding.help.unwrap_or_default())).collect::<Vec<_>>()
+    };
+    let told = late("'left/down'");
+    let [(message, help)] = &told[..] else { panic!("{told:?}") };
+    let whole = "what `root.lowering` waits for never comes: `left/down`, for on this way `left` was not begun, and ignores `left/e_shutdown`";
+    assert_eq!(message, whole);
+    assert_eq!(help, "hear `left/e_shutdown.ignored` there as well: that is told then");
+    assert_eq!(late("'left/down', 'left/e_shutdown.ignored'"), []);
+}
+
 #[test]
 fn a_parent_touches_what_is_exported_and_nothing_else() {
     let pose = "connect('left.pose', 'right.ref')";

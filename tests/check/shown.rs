@@ -218,6 +218,37 @@ fn coordinators() -> Vec<Row> {
             &["one.undo.failed"],
         ),
         row(
+            "coord::raced",
+            "`soft` of `first` and `hard` of `second` are asked for at once: of `property_set a.gain = 1.5` and `property_set a.gain = 2.0`",
+            Small::several(
+                "one = Configuration { create('a', 'Drive') }, soft = Configuration { property_set('a.gain', 1.5) },
+                 hard = Configuration { property_set('a.gain', 2.0) },",
+                &[
+                    (
+                        "first",
+                        &shared(
+                            "one",
+                            "trans { src = 'idle', tgt = 'up', events = { 'e_start' } }, softly = state { config = 'soft' },
+                             trans { src = 'up', tgt = 'softly', events = { 'e_use' } },
+                             trans { src = 'softly', tgt = 'leaving', events = { 'e_shutdown' } },",
+                        ),
+                    ),
+                    (
+                        "second",
+                        "idle = state {}, up = state {}, firmly = state { config = 'hard' },
+                         trans { src = 'initial', tgt = 'idle' },
+                         trans { src = 'idle', tgt = 'up', events = { 'e_start' } },
+                         trans { src = 'up', tgt = 'firmly', events = { 'e_use' } },
+                         trans { src = 'up', tgt = 'idle', events = { 'e_shutdown' } },
+                         trans { src = 'firmly', tgt = 'idle', events = { 'e_shutdown', 'hard.failed', 'hard.broken' } },",
+                    ),
+                ],
+                "",
+            ),
+            "wait(0.5) local gain = property('a.gain') assert(gain == 1.5 or gain == 2.0, gain)",
+            &["soft.ok", "hard.ok"],
+        ),
+        row(
             "coord::stack_grows",
             "going round applies `one` again and again",
             Small::new(

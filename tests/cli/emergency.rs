@@ -53,6 +53,36 @@ fn one_that_fails_in_part_stays_and_is_undone_to_what_is_in_force() {
     assert_eq!(said(&demo, &at_once), ["stopped nil", "reset nil"]);
 }
 
+/// Who recovers puts right what differs, and does not let go of what holds: that is done by its own undo. Applied once more, and whole, it
+/// lacks nothing any more, and nothing is broken.
+#[test]
+fn what_holds_in_part_is_not_let_go_by_who_recovers() {
+    let demo = belt();
+    let story = "deploy('deployment.yaml') raise('e_faster') wait_answer('fast.ok', 1)
+         fault('port_write motor.speed = 0.0', 'fail', 1) raise('e_stop') wait_state('stopped.in_part', 1)
+         local ok, why = pcall(recover, 'back')
+         say(tostring(ok) .. ' ' .. tostring(why):gsub('\\n', ' '))
+         for _, frame in ipairs(stack()) do if frame.configuration == 'stop' then say('stop ' .. tostring(frame.partial)) end end
+         apply('stop') wait_answer('stop.ok', 1) say('speed ' .. port('motor.speed'))
+         recover('back') say('whole')
+         undo('stop') wait_answer('stop.undone', 1) say(tostring(pcall(recover, 'back')))
+         for _, entry in ipairs(log{ since = 0 }) do
+             for _, step in ipairs(entry.steps or {}) do if step.target == 'motor.release' then say('released') end end
+         end
+         shutdown()";
+    let told = said(&demo, story);
+    let told: Vec<&String> = told.iter().filter(|line| !line.contains("note ")).collect();
+    assert!(told[0].starts_with("false ") && told[0].contains("`stop` is safe and stays"), "{told:?}");
+    assert!(told[0].contains("operation_call motor.brake() (done, and not taken back)"), "{told:?}");
+    // The whole one has taken the place of its group's frame, and its undo leads to where both are gone.
+    assert_eq!(told[1..], ["stop true", "speed 0.0", "whole", "true"]);
+    // Where it is in no group both are in force, and the undo of the whole one leaves the other.
+    demo.replace("belt/configurations.yaml", "    safe: true\n    group: speed\n", "    safe: true\n");
+    let told = said(&demo, story);
+    let told: Vec<&String> = told.iter().filter(|line| !line.contains("note ")).collect();
+    assert_eq!(told[1..], ["stop true", "speed 0.0", "whole", "false"]);
+}
+
 /// The platform lies, a look finds that, and an emergency of the same group takes the place of what has lied: its undo leads to where that of
 /// the other would have led, and nothing is mended to what nobody has in force any more.
 #[test]
