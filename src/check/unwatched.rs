@@ -35,6 +35,8 @@ pub fn check(deployment: &Deployment, universe: &Universe, charts: &[&Chart]) ->
                 (*at, "a configuration stands for what it sends")
             } else if look.is(name, |ty| is_monitors(ty.name)) {
                 (Origin::NONE, "it runs the monitors")
+            } else if look.is(name, |ty| ty.actuator) {
+                (Origin::NONE, "it is an actuator")
             } else if reach.contains(&name) {
                 (Origin::NONE, "what it sends reaches an actuator")
             } else {

@@ -6,13 +6,15 @@ use super::effort::Effort;
 use super::judge::Traced;
 use super::members::Member;
 use super::product::Product;
-use super::state::{Next, ProductState};
+use super::reactions::triggers;
+use super::state::{Move, Next, ProductState};
 use super::timers::Timer;
 use super::trace::TraceStep;
 use super::tried::{Goal, Way};
 use crate::limits;
 use crate::model::codes::{DEPLOY_BY_HAND, DEPLOY_LEFTOVERS, DEPLOY_NEVER_DOWN, DEPLOY_NEVER_UP, STACK_SQUASHED};
-use crate::model::{Catalogue, Code, Deployment, Finding, Origin, Severity};
+use crate::model::{Catalogue, Code, Deployment, Finding, Origin, Severity, Verdict};
+use crate::stack::Request;
 use crate::statechart::{Chart, NodeId};
 use std::collections::BTreeSet;
 
@@ -21,7 +23,8 @@ pub fn ways(product: &mut Product<'_>) -> Traced {
     let operator = std::mem::take(&mut product.operator);
     let ways = drive::ways(product);
     product.operator = operator;
-    let Some((rise, fall)) = ways else { return Traced::new() };
+    let Some((mut rise, fall)) = ways else { return Traced::new() };
+    before_people(product, &mut rise);
     // The reasons of a refusal are findings of their own, each at its place; the stack is bounded where its limit stands.
     let deployment = product.deployment;
     let placed = |reason: Finding| match reason.code == STACK_SQUASHED {
@@ -199,9 +202,46 @@ fn stops(product: &Product<'_>, way: &Way, code: Code, key: &str, goal: Goal, wh
             "see what is said of it, or let the coordinator ask for it elsewhere".to_owned()
         }
         None if !rests => "wait for an event or for a time (`e_after(1.0)`) somewhere on the way round".to_owned(),
-        None => format!("look at the trace: which event does {several}?"),
+        None => unheard(product, way).unwrap_or_else(|| format!("look at the trace: which event does {several}?")),
     });
     finding.help(help).at(deployment.key_origin(key)).path(key)
+}
+
+/// The answer that comes last on a way that stops, where no transition takes it.
+fn unheard(product: &Product<'_>, way: &Way) -> Option<String> {
+    let last = way.moves.last()?;
+    let heard = way.moves.len().checked_sub(2).map_or(&way.from, |at| &way.moves[at].state);
+    let told = |(request, verdict): &(Request, Verdict)| {
+        let number = product.member(request.requester)?;
+        let (member, leaf) = (&product.members[number], last.state.leaves[number]);
+        let event = verdict.event(request.ask);
+        let waits = triggers(member.chart, leaf).0.contains(&member.chart.event(event));
+        let place = member.chart.fqn(leaf);
+        let stays = heard.leaves[number] == leaf && !waits;
+        stays.then(|| format!("`{event}` comes in `{place}` at last, and no transition waits for it there: write the one that leads on"))
+    };
+    last.answers.iter().find_map(told)
+}
+
+/// A bring-up that comes to where it has failed only after people, or an emergency, have raised something, stops before that by itself.
+fn before_people(product: &Product<'_>, rise: &mut Way) {
+    if rise.failed.is_none() || rise.refused.is_some() {
+        return;
+    }
+    let deployment = product.deployment;
+    let safety = |by: Move| match by {
+        Move::Event(at) => deployment.safety.iter().any(|(event, _)| *event == product.outside[usize::from(at)]),
+        _ => false,
+    };
+    let before = std::iter::once(&rise.from).chain(rise.moves.iter().map(|next| &next.state));
+    let by_people = |(state, next): (&ProductState, &Next)| {
+        let event = product.raised_by_hand(state, next.by);
+        safety(next.by) || event.is_some_and(|event| event != deployment.deploy.event)
+    };
+    if let Some(at) = before.zip(&rise.moves).position(by_people) {
+        rise.moves.truncate(at);
+        rise.failed = None;
+    }
 }
 
 /// That the bring-up goes on only when somebody raises an event: nothing in the deployment does. Mostly it is misspelt.

@@ -209,8 +209,12 @@ impl Engine {
                 let request = requests[group.places[part]];
                 let with = &planned.parts[part].along;
                 let took = || Reason::TookAlong(with.iter().map(|along| TakenAlong::of(&along.frame)).collect());
-                let whole = matches!(ended, PartEnd::Done) && !with.is_empty();
-                reasons.push(if whole { Some(took()) } else { ended.reason() });
+                let undid = planned.parts[part].frame.as_ref().filter(|_| request.ask == Ask::Undo);
+                reasons.push(match (&ended, undid) {
+                    (PartEnd::Done, _) if !with.is_empty() => Some(took()),
+                    (PartEnd::Done, Some(frame)) => Some(Reason::Undid(frame.configuration)),
+                    _ => ended.reason(),
+                });
                 let stood = stood.iter().find(|(of, _)| *of == part).map(|(_, number)| *number);
                 match (&ended, planned.parts[part].pushes) {
                     (PartEnd::Done, Some(id)) => self.applied(id, stood),

@@ -441,6 +441,8 @@ codes! {
         "The frame contains a step that cannot be undone, or the state was committed after it: it is a floor, and neither it nor a frame below it can be popped that is of the same file and shares a component with it. Apply a configuration that leads to the wanted state instead.";
     STACK_SHARED = "stack::shared", "a frame above shares something with this one",
         "A frame below the top can be popped only when nothing above it wrote what it wrote or needs it to be as it is. What a parent set, wrote or called in a subsystem keeps nothing of that from being undone, only what it has connected. The finding names the frame above and the thing they share. Undo the frame above first, or undo down to this one (`davit undo --to N`).";
+    STACK_UNDONE = "stack::undone", "what an undo without a name has undone",
+        "An undo without a name takes back the newest frame of whoever asks for it. This is the configuration that it was of; the next undo takes back the one below it.";
     STACK_TAKEN_ALONG = "stack::taken_along", "what stood in its way was undone with it",
         "While a deployment is led down, what its coordinator undoes takes along the frames of operators that stand in its way, and its own of states that were left and that were not undone then (something safe came, or that failed): newest first, in one transaction, both or none. Not what an operator has made `safe`, nor what would move when it is undone: then the coordinator's undo is refused, and says so.";
     STACK_GROUP = "stack::group", "the group's present frame cannot be replaced",

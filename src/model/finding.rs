@@ -168,7 +168,12 @@ pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Opti
         let (ours, other) = (name.to_lowercase(), candidate.to_lowercase());
         let begins = name.chars().next().map(char::is_uppercase) == candidate.chars().next().map(char::is_uppercase);
         let slips = strsim::osa_distance(&ours, &other) + usize::from(!begins);
-        (slips, strsim::jaro_winkler(&ours, &other), strsim::jaro_winkler(name, candidate))
+        // That both are events (`e_`) makes `e_far` no slip of `e_start`.
+        let alike = match (ours.strip_prefix("e_"), other.strip_prefix("e_")) {
+            (Some(ours), Some(other)) => strsim::jaro_winkler(ours, other),
+            _ => strsim::jaro_winkler(&ours, &other),
+        };
+        (slips, alike, strsim::jaro_winkler(name, candidate))
     };
     known
         .into_iter()
@@ -272,6 +277,8 @@ mod tests {
         assert_eq!(nearest("Gain", known), Some("standard.Gain"));
         assert_eq!(nearest("yubot.Dynamics", known), Some("youbot.Dynamics"));
         assert_eq!(nearest("Winch", known), None);
+        let events = ["e_start", "e_stop"];
+        assert_eq!([nearest("e_far", events), nearest("e_strat", events)], [None, Some("e_start")]);
         let words = ["Configuration", "ConfiguratorConf", "Monitors", "monitor"];
         assert_eq!(
             nearest("ConfigurationConf", words),

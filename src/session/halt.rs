@@ -15,6 +15,9 @@ pub struct StoppingView {
     pub stage: Stage,
     /// A safe configuration holds what is left until somebody asks for force.
     pub held: bool,
+    /// Which one does, in words.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub held_by: Option<String>,
     /// What it waits for: requests that are not answered.
     pub waits_for: Vec<String>,
     /// The time of the first stage stands still.
@@ -25,8 +28,11 @@ pub struct StoppingView {
 impl StoppingView {
     /// Why nothing goes on before somebody decides; none: it goes on.
     pub fn stands_still(&self) -> Option<String> {
-        let held = "a safe configuration holds what is left: `davit shutdown --force`, or a signal, lets go";
-        self.stands_still.as_ref().map(ToString::to_string).or_else(|| self.held.then(|| held.to_owned()))
+        let held = || {
+            let by = self.held_by.as_deref().unwrap_or("a safe configuration is in force");
+            format!("{by}, and holds what is left: `davit shutdown --force`, or a signal, lets go")
+        };
+        self.stands_still.as_ref().map(ToString::to_string).or_else(|| self.held.then(held))
     }
 }
 
@@ -74,7 +80,8 @@ struct HaltState {
     /// Stopping has begun.
     began: bool,
     stage: Option<Stage>,
-    held: bool,
+    /// What holds what is left until somebody asks for force, in words.
+    held_by: Option<String>,
     /// No coordinator leads any more.
     alone: bool,
     /// When one acted by itself last, and the requests that it made.
@@ -108,13 +115,14 @@ impl StoppingState {
         state.alone = stage != Stage::Led;
     }
 
-    pub fn hold(&self, held: bool) {
-        lock(&self.state).held = held;
+    /// Somebody has to ask for force from now on, since that holds what is left; none: not any more.
+    pub fn hold(&self, by: Option<String>) {
+        lock(&self.state).held_by = by;
     }
 
     /// Whether what is left is held until somebody asks for force.
     pub fn is_held(&self) -> bool {
-        lock(&self.state).held
+        lock(&self.state).held_by.is_some()
     }
 
     /// Whether a coordinator still leads down.
@@ -164,6 +172,7 @@ impl StoppingState {
 
     pub fn view(&self, waits_for: Vec<String>) -> Option<StoppingView> {
         let state = lock(&self.state);
-        state.stage.map(|stage| StoppingView { stage, held: state.held, waits_for, stands_still: None })
+        let held_by = state.held_by.clone();
+        state.stage.map(|stage| StoppingView { stage, held: held_by.is_some(), held_by, waits_for, stands_still: None })
     }
 }

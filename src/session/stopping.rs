@@ -104,9 +104,9 @@ impl Session {
                         "{what}: what is left stays as it is until a signal (Ctrl-C) or `davit shutdown --force` asks for force anew"
                     );
                     hub.note(Happening::Noted { note });
-                    hub.halt().hold(true);
+                    hub.halt().hold(Some(what));
                     self.wait_for_force();
-                    hub.halt().hold(false);
+                    hub.halt().hold(None);
                     stage = Stage::Forced;
                     why = Some("as asked for".to_owned());
                 }

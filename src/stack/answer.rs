@@ -109,6 +109,8 @@ pub enum Reason {
     NothingAbove(usize),
     /// It was to be undone, and had no frame.
     NotInForce(ConfigId),
+    /// What an undo without a name has undone.
+    Undid(ConfigId),
     /// It was undone, and these frames with it, which stood in its way.
     TookAlong(Vec<TakenAlong>),
     /// Everything is being taken down.
@@ -293,6 +295,7 @@ impl Reason {
                 Finding::error(codes::NOTHING_TO_UNDO, self.to_string()).help("`davit stack` shows the frames in force")
             }
             Self::NotInForce(_) => Finding::info(codes::NOTHING_TO_UNDO, self.to_string()),
+            Self::Undid(_) => Finding::info(codes::STACK_UNDONE, self.to_string()),
             Self::TookAlong(_) => Finding::info(codes::STACK_TAKEN_ALONG, self.to_string()),
             Self::TakenDown | Self::Ended => {
                 Finding::error(codes::ENDED, self.to_string()).help("deploy again before asking for configurations")
@@ -358,6 +361,7 @@ impl fmt::Display for Reason {
             ),
             Self::NothingAbove(left) => write!(f, "there is nothing to undo: no more is in force than {}", count(left, "frame")),
             Self::NotInForce(id) => write!(f, "`{id}` was not in force: there was nothing to undo"),
+            Self::Undid(id) => write!(f, "`{id}` is undone"),
             Self::TookAlong(frames) => {
                 let of = |left: bool, whose: &str| {
                     let ids = frames.iter().filter(|frame| frame.left == left);

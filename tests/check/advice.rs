@@ -403,3 +403,19 @@ fn what_was_asked_for_twice_and_undone_once_is_told_as_that() {
         "{message}: {help}"
     );
 }
+
+/// A transition that is forgotten in the bring-up is told where it is missing, and not where an emergency would lead.
+#[test]
+fn a_bring_up_that_stops_is_told_where_it_stops() {
+    let states = STATES.replace(
+        "trans { src = \"building\", tgt = \"up\", events = { \"base.ok\" } },",
+        "failed = state {}, trans { src = \"building\", tgt = \"failed\", events = { \"e_stop\" } },
+         trans { src = \"failed\", tgt = \"leaving\", events = { \"e_shutdown\" } },",
+    );
+    let small = Small::new(CONFIGURATIONS, &states, "safety: [e_stop]");
+    small.demo.replace("small.yaml", "deploy: {", "deploy: { failed: [failed],");
+    let said = small.check();
+    let [(message, help)] = texts(&said, "deploy::never_up")[..] else { panic!("{:#}", said.0) };
+    assert_eq!(message, "the bring-up stops at `root.building` and never reaches `up`");
+    assert!(help.starts_with("`base.ok` comes in `root.building` at last, and no transition waits for it"), "{help}");
+}
