@@ -83,6 +83,12 @@ fn first_sentence(text: &str) -> &str {
     text.find(". ").map_or(text, |end| &text[..=end])
 }
 
+/// The codes that are called so in their areas.
+fn called(name: &str) -> Vec<&'static str> {
+    let all = PAGES.iter().map(|page| page.code.0);
+    all.filter(|code| code.rsplit_once("::").is_some_and(|(_, own)| own == name)).collect()
+}
+
 /// A code, else what can be written under that name.
 fn one(out: &Output, what: &str, json: bool) -> Result<(), CommandFailure> {
     if let Some(page) = codes::page(what) {
@@ -99,7 +105,12 @@ fn one(out: &Output, what: &str, json: bool) -> Result<(), CommandFailure> {
     }
     let entries = schema::about(what);
     if entries.is_empty() {
-        return Err(unknown(what));
+        // Of a code only what is behind its area is remembered.
+        let called: Vec<&str> = called(what);
+        return match called[..] {
+            [code] => one(out, code, json),
+            _ => Err(unknown(what)),
+        };
     }
     if json {
         out.json(&entries);
@@ -158,7 +169,10 @@ fn unknown(what: &str) -> CommandFailure {
             "`davit explain` lists all codes, `davit explain --keys` all keys",
         ),
     };
-    let near = nearest(name, PAGES.iter().map(|page| page.code.0).chain(schema::names()));
+    let near = match called(name).first() {
+        Some(code) => Some(*code),
+        None => nearest(name, PAGES.iter().map(|page| page.code.0).chain(schema::names())),
+    };
     let help = near.map_or_else(|| list.to_owned(), |near| and_also(&format!("did you mean `{near}`?"), list));
     CommandFailure::no(CLI_UNKNOWN_CODE, message, help)
 }

@@ -282,7 +282,36 @@ const LEAST_TEXT: usize = 16;
 
 /// How many columns the terminal has that is written to; none: it is no terminal.
 pub fn terminal_columns() -> Option<usize> {
-    terminal_size::terminal_size_of(io::stdout()).map(|(columns, _)| usize::from(columns.0)).filter(|n| *n > 0)
+    terminal().map(|(columns, _)| columns)
+}
+
+/// Columns and rows of the terminal that is written to.
+pub fn terminal() -> Option<(usize, usize)> {
+    let (columns, rows) = terminal_size::terminal_size_of(io::stdout())?;
+    (columns.0 > 0 && rows.0 > 0).then(|| (usize::from(columns.0), usize::from(rows.0)))
+}
+
+/// As much of a page as a terminal of so many columns and rows shows at once, the last row saying how many lines are below it.
+pub fn fitting(page: &str, columns: usize, rows: usize) -> String {
+    let taken = |line: &str| width(line).div_ceil(columns.max(1)).max(1);
+    let lines: Vec<&str> = page.lines().collect();
+    let (mut used, mut shown, mut fits) = (0, 0, 0);
+    for line in &lines {
+        used += taken(line);
+        // One row stays for what is not shown, and one for the cursor.
+        if used + 2 <= rows {
+            fits = shown + 1;
+        }
+        shown += 1;
+    }
+    if used < rows || fits == 0 {
+        return page.to_owned();
+    }
+    format!(
+        "{}\n… {} below: `--depth 0` folds subsystems, `davit status` shows all",
+        lines[..fits].join("\n"),
+        count(lines.len() - fits, "line")
+    )
 }
 
 /// How long lines of text are: 100, or what the terminal has.
@@ -334,6 +363,22 @@ pub fn width(text: &str) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn of_a_page_that_does_not_fit_it_is_said_how_much_is_below() {
+        let page = (1..=9).map(|n| n.to_string()).collect::<Vec<_>>().join("\n");
+        assert_eq!(fitting(&page, 80, 10), page);
+        assert_eq!(fitting(&page, 80, 9).lines().count(), 8);
+        assert!(fitting(&page, 80, 9).starts_with("1\n2\n3\n4\n5\n6\n7\n… 2 lines below"));
+        // A long line takes several rows.
+        let long = format!("{}\n{page}", "x".repeat(25));
+        assert!(
+            fitting(&long, 10, 9)
+                .ends_with("\n1\n2\n3\n4\n… 5 lines below: `--depth 0` folds subsystems, `davit status` shows all"),
+            "{}",
+            fitting(&long, 10, 9)
+        );
+    }
 
     #[test]
     fn columns_align_whatever_their_colour() {

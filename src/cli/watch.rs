@@ -176,7 +176,8 @@ impl WatchScreen {
     }
 
     fn draw(&self, text: String) {
-        self.0.set_message(text);
+        let fits = output::terminal().map(|(columns, rows)| output::fitting(&text, columns, rows));
+        self.0.set_message(fits.unwrap_or(text));
     }
 }
 
