@@ -4,6 +4,7 @@ use super::belief::Beliefs;
 use super::reactions::{Macrostep, Reactions};
 use super::state::ProductState;
 use super::uncertain::uncertain_events;
+use crate::model::subsystem::IGNORED;
 use crate::model::{
     Ask, ConfigId, Configuration, Deployment, EventName, Ident, Statechart, Subsystem, SubsystemStanding,
 };
@@ -31,6 +32,11 @@ pub struct Child {
     pub ends: EventName,
     /// It may take that where nobody has begun it, and tells then when it is down.
     pub ends_unbegun: bool,
+    /// It tells this where it ignores the event that ends it, and is down then, if that was raised once since it was begun; none: it may
+    /// ignore it elsewhere.
+    pub ignores: Option<EventName>,
+    /// A state in which it ignores that though it is not down, while it is led down; none: nowhere, as far as that is known.
+    pub deaf: Option<String>,
     /// Configurations that touch what it exports.
     pub touching: FxHashSet<ConfigId>,
     /// What it may hold for itself.
@@ -44,9 +50,19 @@ pub struct Child {
 }
 
 /// Of so many subsystems of one file it is known how they stand.
-pub const MOST_CHILDREN: usize = 21;
+pub const MOST_CHILDREN: usize = 20;
 
 impl Child {
+    /// Whether it is kept what it means that it ignores the event that ends it: where nothing else is known of what it may tell.
+    pub fn knows_ignored(&self) -> bool {
+        self.ignores.is_some() && self.beliefs.is_none() && !self.ends_unbegun
+    }
+
+    /// Whether this event says that it ignored the event that ends it, and so may say that it is down.
+    pub fn is_down_by(&self, name: EventName) -> bool {
+        self.ignores == Some(name) && self.knows_ignored()
+    }
+
     /// The subsystems of a file, as its coordinators know them.
     pub fn all(deployment: &Deployment) -> Vec<Self> {
         let of = |subsystem: &Subsystem| {
@@ -63,6 +79,9 @@ impl Child {
             let (holds, unbidden) = (subsystem.holds.clone(), !subsystem.holds.is_empty() && is_unbidden(subsystem));
             let (up, beliefs) = (SubsystemStanding::Up.event(path), None);
             let (ends, ends_unbegun) = (own.shutdown.event.within(path), ends_unbegun(own));
+            let ignores = EventName::new(&format!("{ends}{IGNORED}")).ok();
+            let ignores = ignores.filter(|_| until == ends && own.subsystems.is_empty() && deaf(own, false).is_none());
+            let deaf = ignores.and_then(|_| deaf(own, true));
             let uncertain = uncertain_events(own).into_iter().map(|event| event.within(path)).collect();
             Self {
                 path,
@@ -74,6 +93,8 @@ impl Child {
                 down,
                 ends,
                 ends_unbegun,
+                ignores,
+                deaf,
                 touching,
                 holds,
                 unbidden,
@@ -95,6 +116,38 @@ pub fn promised(at: usize) -> u64 {
 
 /// One was begun anew before it was heard to be down: what is heard then may be of the life before.
 pub const DOUBT: u64 = 1 << 63;
+
+/// One was begun that had been ended before, and has not told yet that it ignored that.
+pub const MIXED: u64 = 1 << 62;
+
+/// A state in which a subsystem ignores the event that ends it though it is not down, as far as that is known of what its coordinators wait for:
+/// before it was raised, or after that as well.
+fn deaf(own: &Deployment, after: bool) -> Option<String> {
+    let of = |(number, written): (usize, &Statechart)| {
+        let unknown = || Some(own.coordinators[number].name.to_string());
+        let Some(chart) = compile(written).0.filter(Chart::is_pure) else { return unknown() };
+        let Ok(down) = chart.find(&own.coordinators[number].down) else { return unknown() };
+        let ends = chart.event(own.shutdown.event);
+        let mut reactions = Reactions::new(own, &chart, &[], Requester::Operator, None);
+        let Some(first) = reactions.enter() else { return unknown() };
+        let (mut known, mut open) = (FxHashSet::from_iter([first.leaf]), vec![first.leaf]);
+        while let Some(leaf) = open.pop() {
+            if !chart.is_inside(leaf, down) && !reactions.react(leaf, ends).taken {
+                return Some(chart.fqn(leaf).to_string());
+            }
+            let mut events: Vec<_> = chart.events().iter().map(|event| chart.event(*event)).collect();
+            events.extend(reactions.offers(leaf).iter());
+            for event in events.into_iter().filter(|event| after || *event != ends) {
+                let then = reactions.react(leaf, event).leaf;
+                if known.insert(then) {
+                    open.push(then);
+                }
+            }
+        }
+        None
+    };
+    own.charts().enumerate().find_map(of)
+}
 
 /// Whether the event that ends it leads a coordinator of it somewhere, wherever that can come to before it is begun: as far as that is known from
 /// where it is at first.

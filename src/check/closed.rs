@@ -11,7 +11,7 @@ use super::state::{Move, ProductState};
 use super::uncertain::fails;
 use crate::model::{Ask, EventName, Monitor, Origin, SubsystemStanding, Verdict};
 use crate::statechart::EventId;
-use crate::system::View as _;
+use crate::system::{ComponentNode, View as _};
 
 impl Product<'_> {
     /// What is known of each event from outside.
@@ -97,6 +97,14 @@ impl Product<'_> {
         reacts || deployment.monitors.iter().flat_map(Monitor::events).any(|event| event == name)
     }
 
+    /// Whether a monitor, or a component that is there, may raise it.
+    pub(super) fn is_raised_inside(&self, state: &ProductState, name: EventName) -> bool {
+        let mut raises = false;
+        let mut look = |node: &ComponentNode| raises |= node.ty.raises.keys().any(|event| *event == name);
+        let known = self.worlds.get(state.world).map(|world| world.system.for_each_component(&mut look));
+        known.is_none() || raises || self.is_reported(name)
+    }
+
     /// Whether it comes from outside, and need not come: it tells that something has failed, or on the way up that a subsystem leaves.
     pub(super) fn need_not_come(&self, by: Move, stopping: bool) -> bool {
         let Move::Event(at) = by else { return false };
@@ -115,12 +123,10 @@ impl Product<'_> {
         let Move::Event(at) = by else { return None };
         let deployment = self.deployment;
         let listed = |list: &[(EventName, Origin)], name: EventName| list.iter().any(|(event, _)| *event == name);
-        let world = self.worlds.get(state.world)?;
         let known = |name: EventName| {
-            let mut raised = self.from_outside[usize::from(at)].told_between
-                || self.is_reported(name)
+            let raised = self.from_outside[usize::from(at)].told_between
+                || self.is_raised_inside(state, name)
                 || self.is_told_by_child(name);
-            world.system.for_each_component(&mut |node| raised |= node.ty.raises.keys().any(|event| *event == name));
             raised || fails(name) || listed(&deployment.interface.accepts, name) || listed(&deployment.safety, name)
         };
         // What is followed as one is raised where one of them is.

@@ -7,7 +7,7 @@
 
 use super::universe::{Creation, Creations, Universe};
 use crate::limits;
-use crate::model::codes::CHANGE_TWICE;
+use crate::model::codes::{CHANGE_TWICE, MISSING_PROPERTY};
 use crate::model::finding::nearest;
 use crate::model::{
     Change, ChangeKind, ComponentName, ConfigId, Configuration, Deployment, Finding, Findings, Origin, Severity,
@@ -101,7 +101,9 @@ impl<'a> ConfigurationCheck<'a> {
             }
         }
         for (i, change) in configuration.changes.iter().enumerate() {
-            let found = self.change(configuration.id, change);
+            let mut found = self.change(configuration.id, change);
+            // One that is misspelt is missing as well: first how it is spelt.
+            found.sort_by_key(|finding| finding.code == MISSING_PROPERTY);
             let path = || format!("configurations.{}.changes[{i}]", configuration.id);
             self.findings.extend(found.into_iter().map(|f| f.at(change.origin).path(path())));
         }

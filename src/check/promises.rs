@@ -2,7 +2,7 @@
 //! to it here: it asks for what touches it only then, and holds no frame of it any more when the promise ends. The file of the subsystem
 //! is in [`exports`](super::exports).
 
-use super::children::{Child, DOUBT, begun, promised, released};
+use super::children::{Child, DOUBT, MIXED, begun, promised, released};
 use super::explore::Graph;
 use super::judge::{Traced, severity_of};
 use super::product::Product;
@@ -11,9 +11,32 @@ use super::state::{Failed, ProductState};
 use crate::model::codes::{COMPOSE_PROMISE, COMPOSE_UNLEFT};
 use crate::model::subsystem::IGNORED;
 use crate::model::{Ask, ConfigId, EventName, Finding};
-use crate::statechart::NodeId;
+use crate::statechart::{EventId, NodeId};
 use rustc_hash::FxHashMap;
 use std::collections::BTreeMap;
+
+/// Whether that a subsystem ignores the event that ends it says that it is down: it was ended once since it was begun, and nothing of before
+/// may be told yet.
+fn is_over(state: &ProductState, at: usize) -> bool {
+    let ended = state.children & (begun(at) | promised(at) | released(at));
+    state.children & MIXED == 0 && ended == begun(at) | released(at) || state.children & begun(at) == 0
+}
+
+/// The event that begins, or ends, a subsystem is raised: kept in what else cannot be of one. It is *released* and *promised* where that was
+/// raised once more since it was ended, and *released* though not begun where it was ended so.
+fn raised_anew(state: &mut ProductState, at: usize, begins: bool, ends: bool) {
+    let (is_begun, is_released) = (state.children & begun(at) != 0, state.children & released(at) != 0);
+    match (is_begun, is_released) {
+        (true, true) if begins || ends => state.children |= promised(at),
+        (false, false) if ends => state.children = state.children & !promised(at) | released(at),
+        // What is ignored of that may be told in the life that begins.
+        (false, true) if begins => {
+            state.children &= !released(at);
+            state.children |= MIXED;
+        }
+        _ => {}
+    }
+}
 
 impl Product<'_> {
     /// An event is heard, or would be if anybody waited for it: it may tell how a subsystem stands.
@@ -24,7 +47,7 @@ impl Product<'_> {
                 if state.children & released(at) == 0 {
                     state.children |= promised(at);
                 }
-            } else if name == child.down {
+            } else if name == child.down || child.is_down_by(name) && (child.deaf.is_none() || is_over(state, at)) {
                 state.children &= !(promised(at) | begun(at) | released(at));
             }
         }
@@ -43,6 +66,9 @@ impl Product<'_> {
                     state.told.push(name);
                 }
             }
+            if child.knows_ignored() && child.deaf.is_some() {
+                raised_anew(state, at, name == child.begins, name == child.ends);
+            }
             if name == child.begins {
                 if state.children & begun(at) != 0 && !child.holds.is_empty() {
                     state.children |= DOUBT;
@@ -52,7 +78,7 @@ impl Product<'_> {
                 // What it tells of that, if it does, is heard.
                 state.children |= begun(at);
             }
-            if name == child.until {
+            if name == child.until && state.children & released(at) == 0 {
                 state.children &= !promised(at);
                 if state.children & begun(at) != 0 {
                     state.children |= released(at);
@@ -63,7 +89,7 @@ impl Product<'_> {
 
     /// Whether what a subsystem exports is promised.
     pub(super) fn is_promised(&self, state: &ProductState, at: usize) -> bool {
-        state.children & promised(at) != 0
+        state.children & promised(at) != 0 && state.children & released(at) == 0
     }
 
     /// Whether an event is one of a subsystem that cannot tell anything: nobody has begun it.
@@ -109,7 +135,7 @@ impl Product<'_> {
     /// What is asked for or in force of what a subsystem exports though that need not be there, and of which subsystem.
     fn unpromised(&self, state: &ProductState) -> Option<(ConfigId, bool, usize)> {
         for (at, child) in self.children.iter().enumerate() {
-            if state.children & promised(at) != 0 || child.touching.is_empty() {
+            if self.is_promised(state, at) || child.touching.is_empty() {
                 continue;
             }
             let touches = |id: &ConfigId| child.touching.contains(id);
@@ -154,10 +180,18 @@ impl Graph<'_, '_> {
                 true => format!("`{id}` is in force where `{}` need not be there any more, or not yet", of.path),
                 false => format!("`{id}` is asked for where what `{}` exports need not be there", of.path),
             };
-            let help = format!(
+            let mut help = format!(
                 "ask for it when `{}` was heard, and undo it, and wait for that, before `{}` is raised",
                 of.from, of.until
             );
+            let heard =
+                |ignored: EventName| self.product.members.iter().any(|m| m.chart.event(ignored) != EventId::OTHER);
+            if let (Some(ignored), Some(deaf)) = (of.ignores.filter(|ignored| heard(*ignored)), &of.deaf) {
+                help += &format!(
+                    "; `{ignored}` does not say that it is down, for it ignores that in `{deaf}` as well: hear `{}` there too",
+                    of.ends.local(of.path).unwrap_or_default()
+                );
+            }
             let place = self.product.worlds.configuration(id).map(|c| c.origin).unwrap_or_default();
             let severity = severity_of(self.failed[at as usize]);
             let finding =

@@ -22,27 +22,46 @@ fn raises_there(chart: &Chart, leaf: NodeId, event: EventName) -> bool {
     chart.raises().iter().any(|site| site.name == event && there(site.when))
 }
 
+fn help(child: &Child) -> String {
+    let hear = format!("hear `{}{IGNORED}` there as well: that is told then", child.ends);
+    match (&child.deaf, &child.beliefs) {
+        // Else it is known what it tells, and when.
+        (Some(deaf), None) => format!(
+            "{hear}; and let `{}` hear `{}` in `{deaf}` too, so that this says that it is down",
+            child.path,
+            child.ends.local(child.path).unwrap_or_default()
+        ),
+        _ => hear,
+    }
+}
+
 impl Product<'_> {
     /// The subsystem, by its place, that a coordinator waits for there and that tells nothing more, since it was not begun.
     pub(super) fn waits_for_unbegun(&self, state: &ProductState, number: usize) -> Option<usize> {
-        if self.children.is_empty() || !state.is_at_rest() {
+        let tells_nothing =
+            |at: usize, child: &Child| state.children & begun(at) == 0 && !child.ends_unbegun && !child.unbidden;
+        // Of most states it is known at once.
+        if !self.children.iter().enumerate().any(|(at, child)| tells_nothing(at, child)) || !state.is_at_rest() {
             return None;
         }
         let (member, leaf) = (&self.members[number], state.leaves[number]);
         let (waits, any) = triggers(member.chart, leaf);
         let names: Vec<EventName> = waits.iter().filter_map(|event| member.name_of(*event)).collect();
-        // A time leads on.
+        // A time leads on, or may.
         if any || names.len() < waits.len() {
             return None;
         }
-        let told = |name: &EventName| self.is_told_by_child(*name) && !self.is_silent(state, *name);
+        // So does what components, monitors and other coordinators raise.
+        let told = |name: &EventName| {
+            self.is_told_by_child(*name) && !self.is_silent(state, *name)
+                || self.is_raised_inside(state, *name)
+                || self.members.iter().any(|other| other.chart.raises().iter().any(|site| site.name == *name))
+        };
         let silent = |(at, child): &(usize, &Child)| {
-            let ignores = format!("{}{IGNORED}", child.ends);
-            state.children & begun(*at) == 0
-                && !child.ends_unbegun
-                && !child.unbidden
+            let ignored = |name: &EventName| name.as_str().strip_suffix(IGNORED) == Some(child.ends.as_str());
+            tells_nothing(*at, child)
                 && names.contains(&child.down)
-                && names.iter().all(|name| name.as_str() != ignores && !told(name))
+                && names.iter().all(|name| !ignored(name) && !told(name))
                 && raises_there(member.chart, leaf, child.ends)
         };
         self.children.iter().enumerate().find(silent).map(|(at, _)| at)
@@ -76,7 +95,7 @@ impl Graph<'_, '_> {
             let finding = Finding::new(severity, COORD_STUCK, message)
                 .at(member.chart.origin(leaf))
                 .path(format!("coordinator.{fqn}"))
-                .help(format!("hear `{}{IGNORED}` there as well: that is told then", child.ends));
+                .help(help(child));
             let trace = self.trace(at);
             found.push((finding, trace));
         }

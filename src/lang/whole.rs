@@ -71,9 +71,13 @@ impl DeploymentReader<'_> {
         if language != Language::Yaml {
             let finding =
                 Finding::error(codes::TEXT_UNKNOWN_LANGUAGE, "a deployment is written in YAML").at(reading.whole);
-            cx.refuse(
-                finding.help("give the deployment's file (`deployments/NAME.yaml`); this one can be named in it"),
-            );
+            // What deploys something is a script.
+            let deploys =
+                cx.sources.file(reading.file).text.lines().any(|line| line.trim_start().starts_with("deploy("));
+            cx.refuse(finding.help(match deploys {
+                true => format!("this is a script: `davit run {}` runs it", path.display()),
+                false => "give the deployment's file (`deployments/NAME.yaml`); this one can be named in it".to_owned(),
+            }));
             return None;
         }
         let node = yaml::read(cx, reading)?;

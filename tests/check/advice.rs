@@ -419,3 +419,14 @@ fn a_bring_up_that_stops_is_told_where_it_stops() {
     assert_eq!(message, "the bring-up stops at `root.building` and never reaches `up`");
     assert!(help.starts_with("`base.ok` comes in `root.building` at last, and no transition waits for it"), "{help}");
 }
+
+/// A property that is misspelt is missing as well: that is told second.
+#[test]
+fn a_misspelt_property_is_told_before_the_one_that_is_missing() {
+    let small =
+        Small::new("base = Configuration { create('a', 'Drive', { properties = { gian = 2.0 } }) }", STATES, "");
+    small.demo.replace("small.yaml", "gain: { type: float, default: 1.0 }", "gain: { type: float }");
+    let said = small.check();
+    let codes: Vec<&str> = said.0["findings"].as_array().unwrap().iter().filter_map(|f| f["code"].as_str()).collect();
+    assert_eq!(codes[..2], ["conf::unknown_property", "conf::missing_property"], "{:#}", said.0);
+}

@@ -34,7 +34,7 @@ pub const SOLO_COORDINATOR: &str = "return state {
   trans { src = 'lowering', tgt = 'idle', events = { 'left/down' } },
 }";
 
-fn solo(changes: &[(&str, &str, &str)]) -> Vec<Finding> {
+pub fn solo(changes: &[(&str, &str, &str)]) -> Vec<Finding> {
     let loaded = load(&files(changes), "solo.yaml", &[]);
     let deployment = loaded.deployment.unwrap_or_else(|| panic!("{:#?}", loaded.findings));
     let catalogue = catalogue(&deployment);

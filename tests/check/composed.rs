@@ -1,6 +1,6 @@
 //! Deployments with subsystems: what each file is held to, and that what is found file by file holds of all together.
 
-use super::automata::{SOLO, SOLO_CONF, SOLO_COORDINATOR};
+use super::automata::{SOLO, SOLO_CONF, SOLO_COORDINATOR, solo};
 use davit::check::{self, Effort};
 use davit::lang::{self, LoadOptions, Sources};
 use davit::libraries::monitors;
@@ -267,6 +267,73 @@ fn who_ends_what_was_not_begun_is_told_to_hear_that_this_is_ignored() {
     assert_eq!(message, whole);
     assert_eq!(help, "hear `left/e_shutdown.ignored` there as well: that is told then");
     assert_eq!(late("'left/down', 'left/e_shutdown.ignored'"), []);
+}
+
+/// Where nothing is known of the order in which a subsystem tells things (its coordinators are followed apart), what it ignores is known all the
+/// same: where its file takes the event that ends it everywhere but in *down*, that it ignores it says that it is down.
+#[test]
+fn a_subsystem_that_ignores_its_end_is_down_if_it_takes_that_everywhere_else() {
+    const PLAIN: &str = "return state {
+      idle = state {}, making = state { entry = 'make' }, starting = state { entry = 'run' }, on = state {},
+      stopping = state { entry = 'run.undo' }, unmaking = state { entry = 'make.undo' }, undone = state {},
+      trans { src = 'initial', tgt = 'idle' },
+      trans { src = 'idle', tgt = 'making', events = { 'e_start' } },
+      trans { src = 'making', tgt = 'starting', events = { 'make.ok' } },
+      trans { src = 'making', tgt = 'undone', events = { 'make.failed', 'make.broken' } },
+      trans { src = 'making', tgt = 'unmaking', events = { 'e_shutdown' } },
+      trans { src = 'undone', tgt = 'unmaking', events = { 'e_shutdown' } },
+      trans { src = 'starting', tgt = 'on', events = { 'run.ok' } },
+      trans { src = 'starting', tgt = 'stopping', events = { 'run.failed', 'run.broken', 'e_shutdown' } },
+      trans { src = 'on', tgt = 'stopping', events = { 'e_shutdown' } },
+      trans { src = 'stopping', tgt = 'unmaking', events = { 'run.undone', 'run.undo.failed', 'run.undo.broken' } },
+      trans { src = 'unmaking', tgt = 'idle', events = { 'make.undone' } },
+      trans { src = 'unmaking', tgt = 'undone', events = { 'make.undo.failed', 'make.undo.broken' } },
+    }";
+    const PARENT: &str = "return state {
+      idle = state {}, early = state {}, raising = state { entry = 'left/e_start' }, on = state { entry = 'stiff' },
+      parting = state { entry = 'stiff.undo' }, lowering = state { entry = 'left/e_shutdown' },
+      trans { src = 'initial', tgt = 'idle' },
+      trans { src = 'idle', tgt = 'early', events = { 'e_start' } },
+      trans { src = 'early', tgt = 'raising', events = { 'e_go' } },
+      trans { src = 'early', tgt = 'lowering', events = { 'e_shutdown' } },
+      trans { src = 'raising', tgt = 'on', events = { 'left/up' } },
+      trans { src = 'raising', tgt = 'lowering', events = { 'left/failed', 'e_shutdown' } },
+      trans { src = 'on', tgt = 'parting', events = { 'e_shutdown', 'stiff.failed', 'stiff.broken' } },
+      trans { src = 'parting', tgt = 'lowering', events = { 'stiff.undone', 'stiff.undo.failed', 'stiff.undo.broken' } },
+      trans { src = 'lowering', tgt = 'idle', events = { 'left/down', 'left/e_shutdown.ignored' } },
+      AGAIN
+    }";
+    let found = |keen: bool, again: bool| {
+        let hears = "trans { src = 'stopping', tgt = 'stopping', events = { 'e_shutdown' } },
+             trans { src = 'unmaking', tgt = 'unmaking', events = { 'e_shutdown' } },
+             trans { src = 'making', tgt";
+        let plain = if keen { PLAIN.replacen("trans { src = 'making', tgt", hears, 1) } else { PLAIN.to_owned() };
+        let once_more = "held = state {}, trans { src = 'lowering', tgt = 'held', events = { 'e_hold' } },
+             trans { src = 'held', tgt = 'lowering', events = { 'e_shutdown', 'e_go' } },";
+        let parent = PARENT.replace("AGAIN", if again { once_more } else { "" });
+        let promise = "  from: e_built\naccepts: [e_released]\nemits: [e_built, e_leaving]\n\
+                       leaving: { says: e_leaving, until: e_released }\n";
+        let all = solo(&[
+            ("arm.yaml", promise, ""),
+            ("arm.yaml", "coordinator: arm.lua", "coordinators: { arm: arm.lua, voice: voice.lua }"),
+            ("arm.yaml", "up: on", "up: [arm:on, voice:loud]"),
+            ("arm.yaml", "down: idle", "down: [arm:idle, voice:quiet]"),
+            ("arm.lua", ARM_COORDINATOR, &plain),
+            ("voice.lua", "{ entry = 'e_built' }", "{}"),
+            ("solo.lua", SOLO_COORDINATOR, &parent),
+        ]);
+        let promise = all.into_iter().filter(|finding| finding.code.0 == "compose::promise" && finding.is_error());
+        promise.map(|finding| finding.help.unwrap_or_default()).collect::<Vec<_>>()
+    };
+    assert_eq!(found(true, true), [""; 0]);
+    // Else where it is ended once: that it ignores as well what comes while it is led down is another matter.
+    assert_eq!(found(false, false), [""; 0]);
+    let told = found(false, true);
+    assert!(
+        !told.is_empty()
+            && told[0].contains("for it ignores that in `root.stopping` as well: hear `e_shutdown` there too"),
+        "{told:?}"
+    );
 }
 
 #[test]

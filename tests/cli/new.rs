@@ -66,3 +66,26 @@ fn nothing_that_is_there_is_touched() {
     let here = demo.command(&["new", "."]).current_dir(demo.path("here")).output().unwrap();
     assert!(here.status.success() && demo.read("here/deployment.yaml").contains("\nname: here\n"));
 }
+
+/// What is no deployment is told what it is.
+#[test]
+fn a_script_that_is_checked_is_told_how_it_is_run() {
+    let demo = Demo::new();
+    assert_eq!(demo.run(&["new", "belt"]).code, 0);
+    let checked = demo.run(&["check", "belt/story.lua"]);
+    assert!(checked.code == 2 || checked.code == 1, "{}", checked.code);
+    assert!(checked.err.contains("this is a script: `davit run belt/story.lua` runs it"), "{}", checked.err);
+}
+
+/// A code is found by what is behind its area.
+#[test]
+fn a_code_is_explained_by_its_own_name() {
+    let demo = Demo::new();
+    let explained = demo.run(&["explain", "never_up"]);
+    assert!(
+        explained.code == 0 && explained.out.starts_with("deploy::never_up: "),
+        "{}{}",
+        explained.out,
+        explained.err
+    );
+}
