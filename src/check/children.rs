@@ -32,11 +32,12 @@ pub struct Child {
     pub ends: EventName,
     /// It may take that where nobody has begun it, and tells then when it is down.
     pub ends_unbegun: bool,
-    /// It tells this where it ignores the event that ends it, and is down then, if that was raised once since it was begun; none: it may
-    /// ignore it elsewhere.
+    /// It tells this where it ignores the event that ends it, as far as it is known where it does.
     pub ignores: Option<EventName>,
-    /// A state in which it ignores that though it is not down, while it is led down; none: nowhere, as far as that is known.
+    /// A state in which it ignores that though it is not down; none: nowhere.
     pub deaf: Option<String>,
+    /// It does so only while it is led down: if that was raised once since it was begun, it is down where it ignores it.
+    pub deaf_once_ended: bool,
     /// Configurations that touch what it exports.
     pub touching: FxHashSet<ConfigId>,
     /// What it may hold for itself.
@@ -55,7 +56,7 @@ pub const MOST_CHILDREN: usize = 20;
 impl Child {
     /// Whether it is kept what it means that it ignores the event that ends it: where nothing else is known of what it may tell.
     pub fn knows_ignored(&self) -> bool {
-        self.ignores.is_some() && self.beliefs.is_none() && !self.ends_unbegun
+        self.ignores.is_some() && self.deaf_once_ended && self.beliefs.is_none() && !self.ends_unbegun
     }
 
     /// Whether this event says that it ignored the event that ends it, and so may say that it is down.
@@ -80,8 +81,10 @@ impl Child {
             let (up, beliefs) = (SubsystemStanding::Up.event(path), None);
             let (ends, ends_unbegun) = (own.shutdown.event.within(path), ends_unbegun(own));
             let ignores = EventName::new(&format!("{ends}{IGNORED}")).ok();
-            let ignores = ignores.filter(|_| until == ends && own.subsystems.is_empty() && deaf(own, false).is_none());
-            let deaf = ignores.and_then(|_| deaf(own, true));
+            let ignores = ignores.filter(|_| until == ends && own.subsystems.is_empty());
+            let at_first = ignores.and_then(|_| deaf(own, false));
+            let deaf_once_ended = at_first.is_none();
+            let deaf = at_first.or_else(|| ignores.and_then(|_| deaf(own, true)));
             let uncertain = uncertain_events(own).into_iter().map(|event| event.within(path)).collect();
             Self {
                 path,
@@ -95,6 +98,7 @@ impl Child {
                 ends_unbegun,
                 ignores,
                 deaf,
+                deaf_once_ended,
                 touching,
                 holds,
                 unbidden,
@@ -173,7 +177,7 @@ pub fn not_down_at_first(own: &Deployment) -> Option<usize> {
 
 /// Whether a subsystem, or one inside it, goes somewhere from where it is down by anything but the event that begins it, or an operator may
 /// apply something there. Where the event that ends it leads, without asking for anything, it is to be down.
-fn is_unbidden(subsystem: &Subsystem) -> bool {
+pub fn is_unbidden(subsystem: &Subsystem) -> bool {
     let own = &*subsystem.own;
     let wakes = |chart: &Chart| {
         let (begins, ends) = (chart.event(own.deploy.event), chart.event(own.shutdown.event));

@@ -16,12 +16,29 @@ fn writes(change: &Change) -> bool {
     matches!(change.kind, ChangeKind::PropertySet { .. } | ChangeKind::PortWrite { .. })
 }
 
+/// Whether two writes come to the same: a whole number is written on what takes fractions as well.
+fn is_alike(one: &ChangeKind, other: &ChangeKind) -> bool {
+    use ChangeKind::{PortWrite, PropertySet};
+    match (one, other) {
+        (PropertySet { value: a, .. }, PropertySet { value: b, .. })
+        | (PortWrite { value: a, .. }, PortWrite { value: b, .. }) => {
+            a == b || a.as_f64().is_some_and(|number| b.as_f64() == Some(number))
+        }
+        _ => one == other,
+    }
+}
+
 /// Two changes of these configurations that write the same, with different values.
 fn rivals(deployment: &Deployment, one: ConfigId, other: ConfigId) -> Option<(&Change, &Change)> {
+    let group = |id| deployment.configuration(id).and_then(|c| c.group);
+    // Of one group the later one is refused, or takes the place of the other.
+    if group(one).is_some() && group(one) == group(other) {
+        return None;
+    }
     let of = |id| deployment.configuration(id).into_iter().flat_map(|c| &c.changes).filter(|change| writes(change));
     of(one).find_map(|own| {
         let same = |theirs: &&Change| ConflictSubject::of(&theirs.kind) == ConflictSubject::of(&own.kind);
-        of(other).find(|theirs| same(theirs) && theirs.kind != own.kind).map(|theirs| (own, theirs))
+        of(other).find(|theirs| same(theirs) && !is_alike(&theirs.kind, &own.kind)).map(|theirs| (own, theirs))
     })
 }
 
@@ -102,5 +119,19 @@ impl Graph<'_, '_> {
             let trace = self.trace(at);
             found.push((finding, trace));
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::{MemberRef, Value};
+
+    #[test]
+    fn what_is_written_as_a_whole_number_is_the_same_value() {
+        let set = |value| ChangeKind::PropertySet { property: MemberRef::new("a.k").unwrap(), value };
+        assert!(is_alike(&set(Value::Int(2)), &set(Value::Float(2.0))));
+        assert!(!is_alike(&set(Value::Int(2)), &set(Value::Float(2.5))));
+        assert!(!is_alike(&set(Value::Bool(true)), &set(Value::Int(1))));
     }
 }

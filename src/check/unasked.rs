@@ -1,5 +1,6 @@
 //! What a file declares and nothing in it leads to: a configuration that nobody asks for, a subsystem that nobody begins.
 
+use super::children::is_unbidden;
 use super::coupling::{asked, by_operator};
 use crate::model::codes::{COMPOSE_UNBEGUN, CONF_UNASKED};
 use crate::model::{ConfigId, Configuration, Deployment, Finding, Findings, Subsystem};
@@ -43,7 +44,7 @@ fn is_never_begun(own: &Deployment, subsystem: &Subsystem, charts: &[&Chart]) ->
     let begins = subsystem.own.deploy.event.within(subsystem.name);
     let raised = charts.iter().any(|chart| chart.raises().iter().any(|site| site.name == begins));
     // One that an operator may raise in its parent's place.
-    !raised && !own.safety.iter().any(|(event, _)| *event == begins)
+    !raised && !is_unbidden(subsystem) && !own.safety.iter().any(|(event, _)| *event == begins)
 }
 
 fn unbegun(of: &Subsystem) -> Finding {

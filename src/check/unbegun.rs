@@ -87,7 +87,7 @@ impl Graph<'_, '_> {
             let (member, child) = (&self.product.members[number], &self.product.children[child]);
             let fqn = member.chart.fqn(leaf).to_string();
             let message = format!(
-                "what `{fqn}` waits for never comes: `{}`, for on this way `{}` was not begun, and ignores `{}`",
+                "what `{fqn}` waits for never comes: `{}`, for on this way `{}` was not begun, or is down again, and ignores `{}`",
                 child.down, child.path, child.ends
             );
             // Where an undo has failed not every coordinator can go on.

@@ -13,7 +13,7 @@ use super::trace::TraceStep;
 use super::tried::{Goal, Way};
 use crate::limits;
 use crate::model::codes::{DEPLOY_BY_HAND, DEPLOY_LEFTOVERS, DEPLOY_NEVER_DOWN, DEPLOY_NEVER_UP, STACK_SQUASHED};
-use crate::model::{Catalogue, Code, Deployment, Finding, Origin, Severity, Verdict};
+use crate::model::{Catalogue, Code, Deployment, EventName, Finding, Origin, Severity, Verdict};
 use crate::stack::Request;
 use crate::statechart::{Chart, NodeId};
 use std::collections::BTreeSet;
@@ -23,8 +23,9 @@ pub fn ways(product: &mut Product<'_>) -> Traced {
     let operator = std::mem::take(&mut product.operator);
     let ways = drive::ways(product);
     product.operator = operator;
-    let Some((mut rise, fall)) = ways else { return Traced::new() };
-    before_people(product, &mut rise);
+    let Some((mut rise, mut fall)) = ways else { return Traced::new() };
+    by_itself(product, &mut rise);
+    fall.iter_mut().for_each(|fall| by_itself(product, fall));
     // The reasons of a refusal are findings of their own, each at its place; the stack is bounded where its limit stands.
     let deployment = product.deployment;
     let placed = |reason: Finding| match reason.code == STACK_SQUASHED {
@@ -196,51 +197,62 @@ fn stops(product: &Product<'_>, way: &Way, code: Code, key: &str, goal: Goal, wh
         )
     });
     let untold = || untold(product, code);
-    let help = help.or(failed).or(overtaken).or_else(untold).unwrap_or_else(|| match closed.first() {
+    let begins = if code == DEPLOY_NEVER_UP { deployment.deploy.event } else { deployment.shutdown.event };
+    let unheard = || (rests && way.refused.is_none()).then(|| unheard(product, way, begins)).flatten();
+    let help = help.or(failed).or(overtaken).or_else(untold).or_else(unheard).unwrap_or_else(|| match closed.first() {
         Some(event) => still_comes(event.as_str()),
         None if way.refused.is_some() => {
             "see what is said of it, or let the coordinator ask for it elsewhere".to_owned()
         }
         None if !rests => "wait for an event or for a time (`e_after(1.0)`) somewhere on the way round".to_owned(),
-        None => unheard(product, way).unwrap_or_else(|| format!("look at the trace: which event does {several}?")),
+        None => format!("look at the trace: which event does {several}?"),
     });
     finding.help(help).at(deployment.key_origin(key)).path(key)
 }
 
-/// The answer that comes last on a way that stops, where no transition takes it.
-fn unheard(product: &Product<'_>, way: &Way) -> Option<String> {
-    let last = way.moves.last()?;
-    let heard = way.moves.len().checked_sub(2).map_or(&way.from, |at| &way.moves[at].state);
+/// What comes last on a way that stops, where no transition takes it: an answer, or what it begins with.
+fn unheard(product: &Product<'_>, way: &Way, begins: EventName) -> Option<String> {
+    let waits = |number: usize, event: EventName| {
+        let (member, leaf) = (&product.members[number], way.end().leaves[number]);
+        triggers(member.chart, leaf).0.contains(&member.chart.event(event))
+    };
+    let place = |number: usize| product.members[number].chart.fqn(way.end().leaves[number]);
+    if way.end().leaves == way.from.leaves && !way.moves.iter().any(|next| !next.answers.is_empty()) {
+        let number = (0..product.members.len()).find(|number| !waits(*number, begins))?;
+        return Some(format!("no transition waits for `{begins}` in `{}`: write the one that leads on", place(number)));
+    }
+    let before = way.moves.len().checked_sub(2).map_or(&way.from, |at| &way.moves[at].state);
     let told = |(request, verdict): &(Request, Verdict)| {
         let number = product.member(request.requester)?;
-        let (member, leaf) = (&product.members[number], last.state.leaves[number]);
         let event = verdict.event(request.ask);
-        let waits = triggers(member.chart, leaf).0.contains(&member.chart.event(event));
-        let place = member.chart.fqn(leaf);
-        let stays = heard.leaves[number] == leaf && !waits;
-        stays.then(|| format!("`{event}` comes in `{place}` at last, and no transition waits for it there: write the one that leads on"))
+        let stays = before.leaves[number] == way.end().leaves[number] && !waits(number, event);
+        let place = place(number);
+        stays.then(|| {
+            format!("`{event}` comes in `{place}` at last, and no transition waits for it there: write the one that leads on")
+        })
     };
-    last.answers.iter().find_map(told)
+    way.moves.last()?.answers.iter().find_map(told)
 }
 
-/// A bring-up that comes to where it has failed only after people, or an emergency, have raised something, stops before that by itself.
-fn before_people(product: &Product<'_>, rise: &mut Way) {
-    if rise.failed.is_none() || rise.refused.is_some() {
+/// A way that goes on, and does not arrive, only after something safe was asked for, or to where the bring-up has failed after people have raised
+/// something, stops before that by itself.
+fn by_itself(product: &Product<'_>, way: &mut Way) {
+    if way.reached || way.refused.is_some() || way.overtaken.is_some() {
         return;
     }
     let deployment = product.deployment;
-    let safety = |by: Move| match by {
-        Move::Event(at) => deployment.safety.iter().any(|(event, _)| *event == product.outside[usize::from(at)]),
-        _ => false,
+    let failed = way.failed.is_some();
+    let before = std::iter::once(&way.from).chain(way.moves.iter().map(|next| &next.state));
+    let led_off = |(state, next): (&ProductState, &Next)| {
+        let Move::Event(at) = next.by else { return false };
+        let name = product.outside[usize::from(at)];
+        let by_people = || product.raised_by_hand(state, next.by).is_some_and(|event| event != deployment.deploy.event);
+        let safety = deployment.safety.iter().any(|(event, _)| *event == name);
+        safety || !next.state.safe.is_empty() || failed && by_people()
     };
-    let before = std::iter::once(&rise.from).chain(rise.moves.iter().map(|next| &next.state));
-    let by_people = |(state, next): (&ProductState, &Next)| {
-        let event = product.raised_by_hand(state, next.by);
-        safety(next.by) || event.is_some_and(|event| event != deployment.deploy.event)
-    };
-    if let Some(at) = before.zip(&rise.moves).position(by_people) {
-        rise.moves.truncate(at);
-        rise.failed = None;
+    if let Some(at) = before.zip(&way.moves).position(led_off) {
+        way.moves.truncate(at);
+        way.failed = None;
     }
 }
 

@@ -420,6 +420,29 @@ fn a_bring_up_that_stops_is_told_where_it_stops() {
     assert!(help.starts_with("`base.ok` comes in `root.building` at last, and no transition waits for it"), "{help}");
 }
 
+/// So is a way down, and one that nobody begins.
+#[test]
+fn a_way_down_that_stops_is_told_where_it_stops() {
+    let stopped = "safe_hold = state { entry = \"halt\" }, trans { src = \"leaving\", tgt = \"safe_hold\", events = { \"e_stop\" } },";
+    let told = |without: &str| {
+        let states = format!("{}{stopped}", STATES.replace(without, ""));
+        let configurations = CONFIGURATIONS.replace("halt = Configuration {", "halt = Configuration { safe = true,");
+        let said = Small::new(&configurations, &states, "safety: [e_stop]").check();
+        let [(message, help)] = texts(&said, "deploy::never_down")[..] else { panic!("{:#}", said.0) };
+        format!("{message}; {help}")
+    };
+    let undone = told("trans { src = \"leaving\", tgt = \"idle\", events = { \"base.undone\" } },");
+    assert!(
+        undone.starts_with("the shutdown stops at `root.leaving` and never reaches `idle`; `base.undone` comes in `root.leaving` at last"),
+        "{undone}"
+    );
+    let begun = told("trans { src = \"up\", tgt = \"leaving\", events = { \"e_shutdown\" } },");
+    assert!(
+        begun.contains("stops at `root.up`") && begun.contains("no transition waits for `e_shutdown` in `root.up`"),
+        "{begun}"
+    );
+}
+
 /// A property that is misspelt is missing as well: that is told second.
 #[test]
 fn a_misspelt_property_is_told_before_the_one_that_is_missing() {

@@ -263,7 +263,7 @@ fn who_ends_what_was_not_begun_is_told_to_hear_that_this_is_ignored() {
     };
     let told = late("'left/down'");
     let [(message, help)] = &told[..] else { panic!("{told:?}") };
-    let whole = "what `root.lowering` waits for never comes: `left/down`, for on this way `left` was not begun, and ignores `left/e_shutdown`";
+    let whole = "what `root.lowering` waits for never comes: `left/down`, for on this way `left` was not begun, or is down again, and ignores `left/e_shutdown`";
     assert_eq!(message, whole);
     assert_eq!(help, "hear `left/e_shutdown.ignored` there as well: that is told then");
     assert_eq!(late("'left/down', 'left/e_shutdown.ignored'"), []);
@@ -283,7 +283,8 @@ fn a_subsystem_that_ignores_its_end_is_down_if_it_takes_that_everywhere_else() {
       trans { src = 'making', tgt = 'unmaking', events = { 'e_shutdown' } },
       trans { src = 'undone', tgt = 'unmaking', events = { 'e_shutdown' } },
       trans { src = 'starting', tgt = 'on', events = { 'run.ok' } },
-      trans { src = 'starting', tgt = 'stopping', events = { 'run.failed', 'run.broken', 'e_shutdown' } },
+      trans { src = 'starting', tgt = 'undone', events = { 'run.failed', 'run.broken' } },
+      trans { src = 'starting', tgt = 'stopping', events = { 'e_shutdown' } },
       trans { src = 'on', tgt = 'stopping', events = { 'e_shutdown' } },
       trans { src = 'stopping', tgt = 'unmaking', events = { 'run.undone', 'run.undo.failed', 'run.undo.broken' } },
       trans { src = 'unmaking', tgt = 'idle', events = { 'make.undone' } },
@@ -303,11 +304,12 @@ fn a_subsystem_that_ignores_its_end_is_down_if_it_takes_that_everywhere_else() {
       trans { src = 'lowering', tgt = 'idle', events = { 'left/down', 'left/e_shutdown.ignored' } },
       AGAIN
     }";
-    let found = |keen: bool, again: bool| {
+    let found = |keen: bool, again: bool, failed: &str| {
         let hears = "trans { src = 'stopping', tgt = 'stopping', events = { 'e_shutdown' } },
              trans { src = 'unmaking', tgt = 'unmaking', events = { 'e_shutdown' } },
              trans { src = 'making', tgt";
         let plain = if keen { PLAIN.replacen("trans { src = 'making', tgt", hears, 1) } else { PLAIN.to_owned() };
+        let plain = plain.replace("src = 'starting', tgt = 'undone'", &format!("src = 'starting', tgt = '{failed}'"));
         let once_more = "held = state {}, trans { src = 'lowering', tgt = 'held', events = { 'e_hold' } },
              trans { src = 'held', tgt = 'lowering', events = { 'e_shutdown', 'e_go' } },";
         let parent = PARENT.replace("AGAIN", if again { once_more } else { "" });
@@ -325,15 +327,14 @@ fn a_subsystem_that_ignores_its_end_is_down_if_it_takes_that_everywhere_else() {
         let promise = all.into_iter().filter(|finding| finding.code.0 == "compose::promise" && finding.is_error());
         promise.map(|finding| finding.help.unwrap_or_default()).collect::<Vec<_>>()
     };
-    assert_eq!(found(true, true), [""; 0]);
+    assert_eq!(found(true, true, "undone"), [""; 0]);
     // Else where it is ended once: that it ignores as well what comes while it is led down is another matter.
-    assert_eq!(found(false, false), [""; 0]);
-    let told = found(false, true);
-    assert!(
-        !told.is_empty()
-            && told[0].contains("for it ignores that in `root.stopping` as well: hear `e_shutdown` there too"),
-        "{told:?}"
-    );
+    assert_eq!(found(false, false, "undone"), [""; 0]);
+    for (again, failed) in [(true, "undone"), (false, "stopping")] {
+        let told = found(false, again, failed);
+        let why = "for it ignores that in `root.stopping` as well: hear `e_shutdown` there too";
+        assert!(!told.is_empty() && told[0].contains(why), "{told:?}");
+    }
 }
 
 #[test]
