@@ -62,13 +62,15 @@ fn what_holds_in_part_is_not_let_go_by_who_recovers() {
          fault('port_write motor.speed = 0.0', 'fail', 1) raise('e_stop') wait_state('stopped.in_part', 1)
          local ok, why = pcall(recover, 'back')
          say(tostring(ok) .. ' ' .. tostring(why):gsub('\\n', ' '))
+         for _, entry in ipairs(log{ since = 0 }) do
+             for _, step in ipairs(entry.steps or {}) do
+                 if tostring(step.step):find('motor.release', 1, true) then say('released') end
+             end
+         end
          for _, frame in ipairs(stack()) do if frame.configuration == 'stop' then say('stop ' .. tostring(frame.partial)) end end
          apply('stop') wait_answer('stop.ok', 1) say('speed ' .. port('motor.speed'))
          recover('back') say('whole')
          undo('stop') wait_answer('stop.undone', 1) say(tostring(pcall(recover, 'back')))
-         for _, entry in ipairs(log{ since = 0 }) do
-             for _, step in ipairs(entry.steps or {}) do if step.target == 'motor.release' then say('released') end end
-         end
          shutdown()";
     let told = said(&demo, story);
     let told: Vec<&String> = told.iter().filter(|line| !line.contains("note ")).collect();
