@@ -53,6 +53,8 @@ pub struct Hub {
 
 pub(super) struct HubState {
     phase: Phase,
+    /// How often somebody has begun to look what the phase is.
+    looks: u64,
     next: u64,
     outstanding: FxHashMap<RequestId, Outstanding>,
     faults: Vec<ComponentFault>,
@@ -110,6 +112,7 @@ impl Hub {
             real: Clock::real(),
             state: Mutex::new(HubState {
                 phase: Phase::Down,
+                looks: 0,
                 next: 1,
                 outstanding: FxHashMap::default(),
                 faults: Vec::new(),
@@ -343,6 +346,24 @@ impl Hub {
     pub fn set_phase(&self, phase: Phase) {
         let was = std::mem::replace(&mut self.lock().phase, phase);
         if was != phase {
+            self.note(Happening::Phase { phase });
+        }
+    }
+
+    /// Somebody begins to look what the phase is: the number of that look.
+    pub fn look(&self) -> u64 {
+        let mut state = self.lock();
+        state.looks += 1;
+        state.looks
+    }
+
+    /// The phase that `was` is another one now, as a look has seen it; nothing where it is no longer that, or somebody has begun to look since:
+    /// what was seen may be over.
+    pub fn seen_as(&self, look: u64, was: Phase, phase: Phase) {
+        let mut state = self.lock();
+        if (state.looks, state.phase) == (look, was) {
+            state.phase = phase;
+            drop(state);
             self.note(Happening::Phase { phase });
         }
     }

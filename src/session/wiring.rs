@@ -383,10 +383,13 @@ impl Session {
     /// Follows the configurator into *broken* and back.
     pub(super) fn refresh_phase(&self) {
         // Not known: as it was. What was looked at may be over when it is told: then it is looked once more.
-        while let Ok(view) = self.view(false) {
+        loop {
+            let look = self.hub.look();
+            let Ok(view) = self.view(false) else { return };
+            // What somebody has seen before does not count after what somebody else has seen since.
             match (self.hub.phase(), view.is_some_and(|view| view.broken.is_some())) {
-                (Phase::Up, true) => self.hub.set_phase(Phase::Broken),
-                (Phase::Broken, false) => self.hub.set_phase(Phase::Up),
+                (Phase::Up, true) => self.hub.seen_as(look, Phase::Up, Phase::Broken),
+                (Phase::Broken, false) => self.hub.seen_as(look, Phase::Broken, Phase::Up),
                 _ => return,
             }
         }
