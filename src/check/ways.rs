@@ -244,9 +244,13 @@ fn by_itself(product: &Product<'_>, way: &mut Way) {
     let failed = way.failed.is_some();
     let before = std::iter::once(&way.from).chain(way.moves.iter().map(|next| &next.state));
     let led_off = |(state, next): (&ProductState, &Next)| {
+        // What begins or ends the deployment may ask for something safe itself.
         let Move::Event(at) = next.by else { return false };
+        if product.is_first_or_last(next.by) {
+            return false;
+        }
         let name = product.outside[usize::from(at)];
-        let by_people = || product.raised_by_hand(state, next.by).is_some_and(|event| event != deployment.deploy.event);
+        let by_people = || product.raised_by_hand(state, next.by).is_some();
         let safety = deployment.safety.iter().any(|(event, _)| *event == name);
         safety || !next.state.safe.is_empty() || failed && by_people()
     };
