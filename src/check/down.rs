@@ -153,15 +153,16 @@ impl Graph<'_, '_> {
         // Where something fails not every coordinator can go on; but a bring-up that has failed is to be led down.
         let expects = |failed: &[Failed], at: u32| failed[at as usize] == Failed::Nothing || behind_failed[at as usize];
         let mut worst: Option<(u32, Finding)> = None;
-        let mut found_at = |graph: &mut Self, some: Vec<u32>, certain: bool, tell: &dyn Fn(&Self, u32) -> Finding| {
-            let best = graph.best_first(some);
-            let expected = best.iter().find(|at| expects(&graph.failed, **at)).filter(|_| certain);
-            let Some(at) = expected.or(best.first()).copied() else { return };
-            let severity = if expected.is_some() { Severity::Warning } else { Severity::Info };
-            if worst.as_ref().is_none_or(|(_, worst)| severity > worst.severity) {
-                worst = Some((at, Finding { severity, ..tell(graph, at) }));
-            }
-        };
+        let mut found_at =
+            |graph: &mut Self, some: Vec<u32>, certain: bool, tell: &dyn Fn(&mut Self, u32) -> Finding| {
+                let best = graph.best_first(some);
+                let expected = best.iter().find(|at| expects(&graph.failed, **at)).filter(|_| certain);
+                let Some(at) = expected.or(best.first()).copied() else { return };
+                let severity = if expected.is_some() { Severity::Warning } else { Severity::Info };
+                if worst.as_ref().is_none_or(|(_, worst)| severity > worst.severity) {
+                    worst = Some((at, Finding { severity, ..tell(graph, at) }));
+                }
+            };
         let mut before = reaches.to_vec();
         // Nothing comes of what is refused.
         let stopping: Vec<bool> = self.states.iter().map(|state| state.stopping).collect();
@@ -200,19 +201,22 @@ impl Graph<'_, '_> {
             };
             let some = (0..u32::try_from(self.states.len()).unwrap_or_default()).filter(lost).collect();
             if !(self.product.never_down && matches!(barred, Barred::Closed | Barred::Late)) {
-                let tell = |graph: &Self, at| graph.barred(at, barred, &bars, &before);
+                let tell = |graph: &mut Self, at| match graph.loses_the_end(at).filter(|_| barred == Barred::Again) {
+                    Some(finding) => finding,
+                    None => graph.barred(at, barred, &bars, &before),
+                };
                 found_at(self, some, barred != Barred::Reported, &tell);
             }
             (before, before_well) = (after, after_well);
         }
         if !self.product.never_down {
             let slow = self.slow(&bars);
-            let tell = |graph: &Self, at| graph.lasts_too_long(at, slow.always[&at]);
+            let tell = |graph: &mut Self, at| graph.lasts_too_long(at, slow.always[&at]);
             found_at(self, slow.always.keys().copied().collect(), true, &tell);
-            let tell = |graph: &Self, at| graph.is_overtaken(at, slow.overtaken[&at]);
+            let tell = |graph: &mut Self, at| graph.is_overtaken(at, slow.overtaken[&at]);
             found_at(self, slow.overtaken.keys().copied().collect(), true, &tell);
             for (late, certain) in [(&slow.late, true), (&slow.reported, false)] {
-                let tell = |graph: &Self, at| graph.lasts_too_long_late(at, &late[&at]);
+                let tell = |graph: &mut Self, at| graph.lasts_too_long_late(at, &late[&at]);
                 found_at(self, late.keys().copied().collect(), certain, &tell);
             }
         }
@@ -285,6 +289,38 @@ impl Graph<'_, '_> {
             .at(self.product.members[late].chart.origin(state.leaves[late]))
             .path("shutdown.event")
             .help(format!("{help}; else what is left is taken down without the coordinator"))
+    }
+
+    /// What ends the deployment came before a state, where no transition waited for it: it is missing there.
+    fn loses_the_end(&mut self, at: u32) -> Option<Finding> {
+        if self.product.members.len() > 1 {
+            return None;
+        }
+        let event = self.product.deployment.shutdown.event;
+        let way = self.edges_to(at);
+        let ends = |number: &u32| {
+            let edge = &self.edges[*number as usize];
+            matches!(self.by(edge), Move::Event(at) | Move::Dropped(at) if self.product.outside[usize::from(at)] == event)
+        };
+        let number = way.into_iter().rfind(ends)?;
+        let edge = self.edges[number as usize];
+        let (then, now) = (self.states[edge.from as usize].leaves[0], self.states[at as usize].leaves[0]);
+        if self.states[edge.to as usize].leaves[0] != then || then == now {
+            return None;
+        }
+        let chart = &self.product.members[0].chart;
+        let (lost, place) = (chart.fqn(then), chart.fqn(now));
+        let message = format!(
+            "no transition waits for `{event}` in `{lost}`: what comes after leads to `{place}`, and from there only a second one leads down"
+        );
+        let finding = Finding::warning(COORD_NO_WAY_DOWN, message)
+            .at(chart.origin(then))
+            .path(format!("coordinator.{lost}"))
+            .also(chart.origin(now), "it goes on to here")
+            .help(format!(
+                "let `{event}` lead down from `{lost}` as well; else what is left is taken down without the coordinator"
+            ));
+        Some(finding)
     }
 
     /// All are in *down*, and a subsystem is not: nobody is there to lead it down.

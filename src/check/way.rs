@@ -124,7 +124,7 @@ impl Graph<'_, '_> {
     }
 
     /// The edges of the way to a state.
-    fn edges_to(&mut self, at: u32) -> Vec<u32> {
+    pub(super) fn edges_to(&mut self, at: u32) -> Vec<u32> {
         let class = self.failed[at as usize];
         self.find_ways(class);
         let ways = &self.ways[&class];

@@ -13,7 +13,7 @@ use serde_json::{Value as Json, json};
 
 /// Lead a broken deployment out: back to the system before what broke it, or by taking what is there as the state.
 ///
-/// `davit undo ID` of the very configuration that broke it goes back as well. What is safe and in force in part stays, and is named:
+/// The platform is looked at first. `davit undo ID` of the very configuration that broke it goes back as well. What is safe and in force in part stays, and is named:
 /// `davit apply ID` applies it anew, `davit undo ID` lets it go. A deployment that is not broken stays as it
 /// is. Exit status: 0 recovered; 1 refused, or not over in time; 3 still broken: what remains is named.
 #[derive(Debug, clap::Args)]

@@ -190,7 +190,7 @@ pub(super) enum UrgentCommand {
 #[derive(Clone)]
 pub(super) enum QueuedCommand {
     Drift { reply: Sender<Drift> },
-    Recover { direction: Recovery, reply: Sender<Result<(), Arc<Residual>>> },
+    Recover { direction: Recovery, reply: Sender<Result<bool, Arc<Residual>>> },
     TakeBack { deadline: Time, reply: Sender<TakenDown> },
     Force { deadline: Time, reply: Sender<TakenDown> },
     DiscardStack,

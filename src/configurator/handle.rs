@@ -193,8 +193,8 @@ impl ConfiguratorHandle {
         self.ask(deadline, |reply| QueuedCommand::Drift { reply })
     }
 
-    /// Recovers a broken system; the error is what remains. None: no answer by `deadline`.
-    pub fn recover(&self, direction: Recovery, deadline: Time) -> Option<Result<(), Arc<Residual>>> {
+    /// Recovers a broken system, and answers whether it was broken; the error is what remains. None: no answer by `deadline`.
+    pub fn recover(&self, direction: Recovery, deadline: Time) -> Option<Result<bool, Arc<Residual>>> {
         self.ask(deadline, |reply| QueuedCommand::Recover { direction, reply })
     }
 

@@ -23,7 +23,7 @@ impl Engine {
         if let Some(look) = self.observing.out.take() {
             match self.pool.take(look.ticket) {
                 Some(PoolReply::Observed(Ok(seen))) => {
-                    if self.compare(&look, seen) {
+                    if self.compare(&look.components, seen) {
                         return true;
                     }
                 }
@@ -58,12 +58,7 @@ impl Engine {
     fn look_on(&mut self) {
         let now = self.given.clock.now();
         if self.observing.rest.is_empty() {
-            // Also what should not be there: of what some configuration destroys, that it is gone.
-            let there = self.world.system.graph().node_weights().map(|node| node.name);
-            let mut rest: Vec<ComponentName> = there.chain(self.given.claims.components()).collect();
-            rest.sort_unstable();
-            rest.dedup();
-            self.observing.rest = rest;
+            self.observing.rest = self.to_look_at();
             self.observing.owed = !self.world.system.is_empty();
         }
         let busy = self.not_to_be_judged();
@@ -84,6 +79,31 @@ impl Engine {
         self.observing.out = Some(SlowLook { ticket, components, until: deadline + limits::PLATFORM_GRACE });
     }
 
+    /// Also what should not be there: of what some configuration destroys, that it is gone.
+    fn to_look_at(&self) -> Vec<ComponentName> {
+        let there = self.world.system.graph().node_weights().map(|node| node.name);
+        let mut all: Vec<ComponentName> = there.chain(self.given.claims.components()).collect();
+        all.sort_unstable();
+        all.dedup();
+        all
+    }
+
+    /// A whole round at once, and waited for: for who is about to act on what it finds.
+    pub(super) fn compare_all(&mut self) {
+        let busy = self.not_to_be_judged();
+        let names = self.to_look_at().into_iter().filter(|name| !busy.contains(name));
+        let components: Vec<_> = names.map(|name| (name, self.generation(name))).collect();
+        let names: Vec<ComponentName> = components.iter().map(|(name, _)| *name).collect();
+        for (names, components) in
+            names.chunks(limits::OBSERVED_AT_ONCE).zip(components.chunks(limits::OBSERVED_AT_ONCE))
+        {
+            let Some(PoolReply::Observed(Ok(seen))) = self.ask(PlatformCall::ObserveSome(names.to_vec())) else {
+                return;
+            };
+            self.compare(components, seen);
+        }
+    }
+
     /// Components that something is under way with, or of which it is known that they are not as they should be.
     fn not_to_be_judged(&self) -> FxHashSet<ComponentName> {
         let running = self.running.iter().flat_map(|running| running.machine.components());
@@ -92,9 +112,9 @@ impl Engine {
     }
 
     /// Compares what was seen with the model. True: it differs.
-    fn compare(&mut self, look: &SlowLook, mut seen: Snapshot) -> bool {
+    fn compare(&mut self, components: &[(ComponentName, Option<u64>)], mut seen: Snapshot) -> bool {
         let mut busy = self.not_to_be_judged();
-        for (name, generation) in &look.components {
+        for (name, generation) in components {
             if self.generation(*name) != *generation {
                 busy.insert(*name);
             }
@@ -108,7 +128,7 @@ impl Engine {
             }
         }
         let still = |name: &ComponentName| !busy.contains(name);
-        let names: Vec<ComponentName> = look.components.iter().map(|(name, _)| *name).filter(still).collect();
+        let names: Vec<ComponentName> = components.iter().map(|(name, _)| *name).filter(still).collect();
         let mut expected = self.world.system.snapshot_some(&names);
         for snapshot in [&mut seen, &mut expected] {
             snapshot.components.retain(|name, _| still(name));

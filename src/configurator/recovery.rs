@@ -103,11 +103,15 @@ impl Engine {
         Drift { steps, faulted, unsettled, quarantined: self.world.quarantined.clone(), observed: true }
     }
 
-    /// Recovers what is broken; the error is what remains.
-    pub(super) fn recover(&mut self, direction: Recovery) -> Result<(), Arc<Residual>> {
+    /// Recovers what is broken; the error is what remains. Answers whether something was.
+    pub(super) fn recover(&mut self, direction: Recovery) -> Result<bool, Arc<Residual>> {
+        // Whoever asks has often seen it before the slow look has.
+        if direction == Recovery::Back {
+            self.compare_all();
+        }
         let partial = self.world.stack.frames().iter().any(|frame| self.world.stack.is_in_part(frame));
         if self.world.broken.is_empty() && !partial {
-            return Ok(());
+            return Ok(false);
         }
         if !self.running.is_empty() {
             return Err(Arc::new(Residual::of(Reason::Busy)));
@@ -115,7 +119,11 @@ impl Engine {
         match direction {
             Recovery::Back => self.recover_back(),
             Recovery::Accept => self.recover_accept(),
+        }?;
+        if let Some(progress) = &self.given.progress {
+            progress(&Progress::Recovered);
         }
+        Ok(true)
     }
 
     /// Takes what is there as the state, and gives the stack up.
@@ -133,9 +141,6 @@ impl Engine {
                 self.world.broken.clear();
                 self.confirmations.clear();
                 self.changed();
-                if let Some(progress) = &self.given.progress {
-                    progress(&Progress::Recovered);
-                }
                 Ok(())
             }
             // Of what is only in part in force nothing else is known.
@@ -150,11 +155,9 @@ impl Engine {
     /// Goes back to the system before whatever ended *broken*: what differs is mended, what is partial undone. What is safe stays as far
     /// as it came: it holds something that is let go by its own undo, and not by who puts a trouble right.
     fn recover_back(&mut self) -> Result<(), Arc<Residual>> {
-        let mut some = false;
         loop {
             self.after_safe();
             if let Some(at) = self.world.broken.len().checked_sub(1) {
-                some = true;
                 match self.partial_of(at) {
                     Some(frame) if !frame.safe && self.read_broken(at) && self.take_back_straight(at, &frame)? => {}
                     _ => self.repair(at, By::Recovery)?,
@@ -165,15 +168,11 @@ impl Engine {
             let Some(frame) = self.world.stack.frames().iter().rev().find(partial).cloned() else {
                 break;
             };
-            some = true;
             self.pass_floor(&frame);
             let planned =
                 transaction(&self.world.system, &self.world.stack, &[Op::Undo(frame.id)], &self.given.context)
                     .map_err(|refusal| Arc::new(Residual::of(Reason::Refused(refusal.findings))))?;
             self.take_back(&frame, planned)?;
-        }
-        if some && let Some(progress) = &self.given.progress {
-            progress(&Progress::Recovered);
         }
         let stays = self.world.stack.frames().iter().rev().find(|frame| self.world.stack.is_in_part(frame));
         stays.map_or(Ok(()), |frame| Err(self.left_of(frame, Reason::StaysSafe(frame.configuration))))
@@ -181,7 +180,8 @@ impl Engine {
 
     /// What is left in a partial frame, and why it still is.
     fn left_of(&self, frame: &Frame, cause: Reason) -> Arc<Residual> {
-        let left = self.partials.iter().find(|(id, _)| *id == frame.id).map(|(_, left)| (**left).clone());
+        let left = self.partials.iter().find(|(id, _)| *id == frame.id);
+        let left = left.map(|(_, left)| left.of_partial(&self.world.system));
         Arc::new(Residual { cause: cause.clone(), ..left.unwrap_or(Residual::of(cause)) })
     }
 
@@ -210,10 +210,12 @@ impl Engine {
 
     /// Carries the undo of a partial frame out. An operator asks for it, without force.
     fn take_back(&mut self, frame: &Frame, planned: Planned) -> Result<(), Arc<Residual>> {
-        if self.world.stack.safe().next().is_some()
-            && let Some(moving) = planned.steps.iter().find(|planned| planned.moves)
-        {
-            return Err(Arc::new(Residual::of(Reason::Moves(moving.step.clone()))));
+        let kept = planned.steps.iter().filter(|planned| planned.moves).find_map(|planned| {
+            let safe = self.world.stack.keeper_of_step(&planned.step)?;
+            Some((planned.step.clone(), safe))
+        });
+        if let Some((step, safe)) = kept {
+            return Err(self.left_of(frame, Reason::KeptStill { frame: frame.configuration, step, safe }));
         }
         let edits = planned.parts[0].edits.clone();
         let spec = self.spec(&planned, true);

@@ -100,7 +100,7 @@ impl Engine {
     fn may_move(&self, by: By, components: &[ComponentName]) -> bool {
         let components = components.iter().copied();
         match by {
-            By::Recovery => !components.into_iter().any(|component| self.world.stack.keeps_still(component)),
+            By::Recovery => !components.into_iter().any(|component| self.world.stack.keeper_of(component).is_some()),
             By::Request(_) => self
                 .request_of(by)
                 .is_some_and(|request| request.why == Why::Asked && !keeps_still(&self.world, request, components)),

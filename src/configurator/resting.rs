@@ -87,12 +87,13 @@ impl Engine {
     fn begin_applying(&mut self, one: &mut Applied, led: Option<FrameId>) -> Option<(u64, usize)> {
         let planned = one.planned.take()?;
         // Whoever has written it: what it moves counts, which may be of a subsystem.
-        let still = |component: ComponentName| led.is_some_and(|led| self.stands_still(component, led));
-        let moving = planned.steps.iter().find(|planned| {
-            planned.moves && touch::components(&planned.step).iter().any(|component| still(*component))
+        let keeper = |component: ComponentName| led.and_then(|led| self.stands_still(component, led));
+        let moving = planned.steps.iter().filter(|planned| planned.moves).find_map(|planned| {
+            let keeper = touch::components(&planned.step).iter().find_map(|component| keeper(*component));
+            keeper.map(|safe| (planned.step.clone(), safe))
         });
-        if let Some(moving) = moving {
-            one.troubles = vec![Reason::Moves(moving.step.clone())];
+        if let Some((step, safe)) = moving {
+            one.troubles = vec![Reason::Moves(step, Some(safe))];
             return None;
         }
         let steps = planned.steps.len();
@@ -104,15 +105,16 @@ impl Engine {
         Some((number, steps))
     }
 
-    /// Whether a safe configuration keeps a component still also from what is forced: one that was in force before stopping began, or has
+    /// The safe configuration that keeps a component still also from what is forced: one that was in force before stopping began, or has
     /// come since nobody leads; each, where nobody has asked for force.
-    fn stands_still(&self, component: ComponentName, led: FrameId) -> bool {
+    fn stands_still(&self, component: ComponentName, led: FrameId) -> Option<ConfigId> {
         let asked = self.is_hurried();
         let mut safe = self.world.stack.frames().iter().filter(|frame| frame.safe);
-        safe.any(|frame| {
+        let keeper = safe.find(|frame| {
             let keeps = !asked || !self.came_since(frame) || frame.id >= led;
             keeps && is_in_system(frame.configuration, component)
-        })
+        });
+        keeper.map(|frame| frame.configuration)
     }
 
     /// What has come of it, and what of that is tried again.

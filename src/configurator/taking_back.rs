@@ -233,10 +233,10 @@ impl Engine {
 
     fn pop_as(&mut self, frame: &Frame, planned: Planned, deadline: Time) -> Result<(), Reason> {
         // A safe configuration keeps everything still.
-        if self.world.stack.safe().next().is_some()
+        if let Some(safe) = self.world.stack.safe().next()
             && let Some(moving) = planned.steps.iter().find(|planned| planned.moves)
         {
-            return Err(Reason::Moves(moving.step.clone()));
+            return Err(Reason::Moves(moving.step.clone(), Some(safe)));
         }
         let edits = planned.parts[0].edits.clone();
         let mut spec = self.spec(&planned, false);

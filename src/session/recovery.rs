@@ -157,6 +157,8 @@ impl Session {
         self.hub().note(Happening::Requested { request: None, ask: format!("recover --{how}"), by: by.to_owned() });
         let ended = self.configurator().recover(how, deadline)?;
         self.refresh_phase();
+        // Or it was found to be when it was looked at.
+        let was_broken = was_broken || ended != Ok(false);
         let residual = ended.err();
         if let Some(residual) = &residual {
             self.hub().note(Happening::Noted { note: format!("not recovered: {residual}") });

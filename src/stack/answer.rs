@@ -81,8 +81,17 @@ pub enum Reason {
     SafeCame(ConfigId),
     /// It is safe, in force in part, and not taken back by who recovers.
     StaysSafe(ConfigId),
-    /// It would move something while a `safe` configuration is in force.
-    Moves(Step),
+    /// It would move something while a `safe` configuration is in force: which, where one is that keeps it still.
+    Moves(Step, Option<ConfigId>),
+    /// What is left of a frame is not taken back by who recovers: that would move something which a `safe` configuration keeps still.
+    KeptStill {
+        /// Whose frame.
+        frame: ConfigId,
+        /// What would move.
+        step: Step,
+        /// What keeps it still.
+        safe: ConfigId,
+    },
     /// Something would move that nobody asked to move.
     MovesUnasked(Step),
     /// What it needs is being worked on.
@@ -278,7 +287,7 @@ impl Reason {
             Self::SafeCame(_) => Finding::error(codes::INTERRUPTED, self.to_string())
                 .help("ask again when the safe configuration is no longer needed"),
             Self::StaysSafe(_) => Finding::error(codes::STILL_BROKEN, self.to_string()).help(WAY_OUT),
-            Self::Moves(_) => Finding::error(codes::MOVES_WHILE_SAFE, self.to_string()).help(
+            Self::Moves(..) | Self::KeptStill { .. } => Finding::error(codes::MOVES_WHILE_SAFE, self.to_string()).help(
                 "let the coordinator ask for it in a later step, when it is meant to move again; an operator says `--force`",
             ),
             Self::MovesUnasked(_) => Finding::error(codes::MOVES_UNASKED, self.to_string()).help(
@@ -337,7 +346,15 @@ impl fmt::Display for Reason {
                 "`{id}` is safe and stays in force as far as it came: `davit apply {id}` applies it anew, `davit undo {id}` lets it go \
                  (with `--force` where a coordinator asked for it)"
             ),
-            Self::Moves(step) => write!(f, "`{step}` moves, and a safe configuration is in force"),
+            Self::Moves(step, None) => write!(f, "`{step}` moves, and a safe configuration is in force"),
+            Self::Moves(step, Some(safe)) => {
+                write!(f, "`{step}` moves, and the safe configuration `{safe}` is in force")
+            }
+            Self::KeptStill { frame, step, safe } => write!(
+                f,
+                "`{step}` moves, and the safe configuration `{safe}` is in force: `davit undo {safe}` lets it go (with `--force` where a \
+                 coordinator asked for it), and `davit recover --back` goes on then; `davit undo {frame} --force` moves it all the same"
+            ),
             Self::MovesUnasked(step) => write!(f, "`{step}` moves, and nobody asked for that"),
             Self::Busy => f.write_str("requests are under way that it would meddle with"),
             Self::NeedsForce(id) => {

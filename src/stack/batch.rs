@@ -15,7 +15,7 @@ use super::{
 use crate::model::{Ask, ComponentName, ConfigId, Configuration, Finding, OnFailure, Step, Verdict, codes};
 use crate::plan::replace::neighbours;
 use crate::plan::{PlanContext, PlannedStep, Refusal};
-use crate::system::Overlay;
+use crate::system::{Overlay, touch};
 use crate::time::Time;
 use rustc_hash::{FxHashMap, FxHashSet};
 use smallvec::SmallVec;
@@ -380,7 +380,7 @@ fn foreign(frames: &[Arc<super::Frame>], request: &Request) -> Option<ConfigId> 
 /// coordinator asks in a later step they may, or for what is forced.
 pub fn keeps_still(world: &World, request: &Request, components: impl IntoIterator<Item = ComponentName>) -> bool {
     let foreign = request.requester == Requester::Operator || request.why != Why::Asked;
-    let held = || components.into_iter().any(|component| world.stack.keeps_still(component));
+    let held = || components.into_iter().any(|component| world.stack.keeper_of(component).is_some());
     request.still != Stillness::No || foreign && !request.force && held()
 }
 
@@ -408,12 +408,13 @@ fn forbidden(
     for (part, place) in group.places.iter().enumerate() {
         let request = &requests[*place];
         let unasked = unasked(part, request);
-        let kept = |step: &Step| keeps_still(world, request, crate::system::touch::components(step));
+        let kept = |step: &Step| keeps_still(world, request, touch::components(step));
         let steps = planned.steps.iter().enumerate();
         let mut own = steps.filter(|(at, _)| planned.part_of(planned.place(*at)) == part);
         if let Some((_, moving)) = own.find(|(_, planned)| planned.moves && (unasked || kept(&planned.step))) {
             let step = moving.step.clone();
-            return Some((part, if unasked { Reason::MovesUnasked(step) } else { Reason::Moves(step) }));
+            let keeper = world.stack.keeper_of_step(&step);
+            return Some((part, if unasked { Reason::MovesUnasked(step) } else { Reason::Moves(step, keeper) }));
         }
     }
     None

@@ -54,6 +54,7 @@ use crate::model::{ComponentName, ConfigId, Finding, Ident, RunState, Step, code
 use crate::plan::footprint::Footprint;
 use crate::plan::undo::DraftStep;
 use crate::plan::{PlannedStep, SavedValue};
+use crate::system::touch;
 use crate::time::Time;
 use claims::is_in_system;
 use smallvec::SmallVec;
@@ -283,9 +284,14 @@ impl Stack {
         self.frames.iter().filter(|frame| frame.safe).map(|frame| frame.configuration)
     }
 
-    /// Whether one of them keeps a component still: it is in its (sub)system, or in one inside that.
-    pub fn keeps_still(&self, component: ComponentName) -> bool {
-        self.safe().any(|safe| is_in_system(safe, component))
+    /// Which of them keeps a component still: it is in its (sub)system, or in one inside that.
+    pub fn keeper_of(&self, component: ComponentName) -> Option<ConfigId> {
+        self.safe().find(|safe| is_in_system(*safe, component))
+    }
+
+    /// Which of them keeps a component of a step still.
+    pub fn keeper_of_step(&self, step: &Step) -> Option<ConfigId> {
+        touch::components(step).iter().find_map(|component| self.keeper_of(*component))
     }
 
     /// Its coordinator has let go of a frame, and it stays: from now on it belongs to no state, and is taken along where everything is led

@@ -443,6 +443,22 @@ fn a_way_down_that_stops_is_told_where_it_stops() {
     );
 }
 
+/// What ends the deployment may ask for something safe itself: the way goes on from there, and stops where nothing waits for its answer.
+#[test]
+fn a_way_down_that_begins_with_something_safe_is_told_where_it_stops() {
+    let states = STATES
+        .replace(
+            "{ src = \"up\", tgt = \"leaving\", events = { \"e_shutdown\" } }",
+            "{ src = \"up\", tgt = \"halting\", events = { \"e_shutdown\" } }",
+        )
+        .replace("leaving = state", "halting = state { entry = \"halt\" }, leaving = state");
+    let configurations = CONFIGURATIONS.replace("halt = Configuration {", "halt = Configuration { safe = true,");
+    let said = Small::new(&configurations, &states, "safety: [e_stop]").check();
+    let [(message, help)] = texts(&said, "deploy::never_down")[..] else { panic!("{:#}", said.0) };
+    assert_eq!(message, "the shutdown stops at `root.halting` and never reaches `idle`");
+    assert!(help.starts_with("`halt.ok` comes in `root.halting` at last, and no transition waits for it"), "{help}");
+}
+
 /// A property that is misspelt is missing as well: that is told second.
 #[test]
 fn a_misspelt_property_is_told_before_the_one_that_is_missing() {
@@ -452,4 +468,17 @@ fn a_misspelt_property_is_told_before_the_one_that_is_missing() {
     let said = small.check();
     let codes: Vec<&str> = said.0["findings"].as_array().unwrap().iter().filter_map(|f| f["code"].as_str()).collect();
     assert_eq!(codes[..2], ["conf::unknown_property", "conf::missing_property"], "{:#}", said.0);
+}
+
+/// What ends the deployment and is lost is told where it is lost, and not where only a second one would lead down.
+#[test]
+fn an_end_that_is_lost_is_told_where_it_is_lost() {
+    let states = STATES.replace("\"base.failed\", \"base.broken\", \"e_shutdown\"", "\"base.failed\", \"base.broken\"");
+    let said = Small::new(CONFIGURATIONS, &states, "").check();
+    let [(message, help)] = texts(&said, "coord::no_way_down")[..] else { panic!("{:#}", said.0) };
+    assert!(message.starts_with("no transition waits for `e_shutdown` in `root.building`"), "{message}");
+    assert!(message.contains("leads to `root.up`"), "{message}");
+    assert!(help.starts_with("let `e_shutdown` lead down from `root.building` as well"), "{help}");
+    let helped = Small::new(CONFIGURATIONS, STATES, "").check();
+    assert!(texts(&helped, "coord::no_way_down").is_empty(), "{:#}", helped.0);
 }

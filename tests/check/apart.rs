@@ -253,7 +253,7 @@ fn what_is_not_confirmed_while_another_one_is_stopped_is_followed() {
         trans { src = 'lowering', tgt = 'leaving', events = { 'a_up.undone', 'a_up.undo.failed', 'a_up.undo.broken' } },";
     let configurations = "a_base = Configuration { create('a', 'Drive') },
         a_up = Configuration { on_failure = 'rollback', confirm = { event = 'e_yes', within = 0.5 }, operation_call('a.raise') },";
-    assert!(refused_beside(configurations, coordinator, "a safe configuration is in force"));
+    assert!(refused_beside(configurations, coordinator, "the safe configuration `b_calm` is in force"));
 }
 
 /// Their way up and down is looked for group by group: that of twelve, each of which waits for two things, is the sum of theirs, where their

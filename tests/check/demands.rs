@@ -238,7 +238,11 @@ fn one_shutdown_event_leads_down() {
     let deaf = Small::new(configurations, &deaf, "").check();
     let found = deaf.of("coord::no_way_down");
     assert!(
-        found.len() == 1 && found[0]["message"].as_str().unwrap().contains("only a second `e_shutdown`"),
+        found.len() == 1
+            && found[0]["message"]
+                .as_str()
+                .unwrap()
+                .contains("no transition waits for `e_shutdown` in `root.building`"),
         "{:#}",
         deaf.0
     );

@@ -46,7 +46,7 @@ fn an_operator_applies_what_is_listed_or_safe_and_the_rest_by_force() {
     let told = ran.out + &ran.err;
     assert_eq!(ran.code, 0, "{told}");
     assert!(told.contains("`operator:` does not list `mean`") && told.contains("{force = true}"), "{told}");
-    assert!(told.contains("moves, and a safe configuration is in force"), "{told}");
+    assert!(told.contains("moves, and the safe configuration `calm` is in force"), "{told}");
     let explained = Demo::new().run(&["explain", "run::not_listed"]);
     assert!(explained.code == 0 && explained.out.contains("`operator:`"), "{}", explained.out);
 }

@@ -1,6 +1,7 @@
 //! The way out of *broken*: `davit drift`, `davit recover`, `davit commit`, as commands, on the socket and in scripts.
 
 use crate::demo::Demo;
+use crate::emergency::{belt, said};
 use serde_json::{Value, json};
 
 /// A logger whose file decides whether `swap` fails, and whether it can be taken back.
@@ -312,4 +313,30 @@ fn a_script_tries_a_deployment_out_on_the_simulated_platform() {
     assert_eq!(ran.code, 0, "{}{}", ran.out, ran.err);
     let typo = run(&["--platform", "simulted"]);
     assert!(typo.code == 2 && typo.err.contains("simulated"), "{}", typo.err);
+}
+
+/// Who recovers has often seen a difference before the slow look has: it is looked at first, and put right. Nothing is told to be recovered
+/// while something safe stays in force in part, nor to be done and not taken back what somebody has written since.
+#[test]
+fn who_recovers_looks_first() {
+    let demo = belt();
+    let brake = "      - operation_call: { operation: motor.brake }";
+    demo.replace(
+        "belt/configurations.yaml",
+        brake,
+        &format!("{brake}\n      - property_set: {{ property: motor.limit, value: 0.0 }}"),
+    );
+    let told = said(
+        &demo,
+        "local function logged(what) local n = 0 for _, entry in ipairs(log{ since = 0 }) do if entry.what == what then n = n + 1 end end return n end
+         local function tell(when) say(when .. ' ' .. property('motor.limit') .. ' ' .. #drift() .. ' ' .. logged('recovered')) end
+         deploy('deployment.yaml') fault('property_set motor.limit', 'lie') set('motor.limit', 0.25) tell('lied')
+         recover('back') tell('recovered') undo('motor.limit') wait_answer('motor.limit.undone', 1)
+         fault('port_write motor.speed', 'fail', 1) raise('e_stop') wait_state('stopped.in_part', 1)
+         fault('property_set motor.limit', 'lie') set('motor.limit', 0.25) tell('in part')
+         local ok, why = pcall(recover, 'back') why = tostring(why) tell('stays')
+         assert(not ok and why:find('motor.brake() (done, and not taken back)', 1, true) and not why:find('limit', 1, true), why)",
+    );
+    let told: Vec<&String> = told.iter().filter(|line| !line.contains("note ")).collect();
+    assert_eq!(told, ["lied 0.5 1 0", "recovered 0.25 0 1", "in part 0.0 1 1", "stays 0.25 0 1"]);
 }

@@ -112,7 +112,7 @@ fn what_a_subsystem_holds_its_parents_rest_does_not_move() {
     assert!(["tuck", "left/fold", "right/fold"].iter().all(|what| rested(&free, what)), "{}", free.out);
     let held = forced("pair.yaml", "raise('left/e_estop') wait_answer('left/hold.ok', 1)");
     assert!(rested(&held, "right/fold") && !rested(&held, "tuck"), "{}", held.out);
-    let why = "`operation_call left/Arm.fold()` moves, and a safe configuration is in force";
+    let why = "`operation_call left/Arm.fold()` moves, and the safe configuration `left/hold` is in force";
     assert!(held.out.contains(why) && !held.out.contains("`left/fold`"), "{}", held.out);
 }
 

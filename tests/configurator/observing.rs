@@ -52,7 +52,7 @@ fn what_a_stranger_changes_is_found_and_the_newest_who_wrote_it_is_lost() {
     rig.wait(20.0);
     assert_eq!(lost(&rig), ["eight"]);
     let deadline = rig.clock.now() + Duration::from_secs(5);
-    assert_eq!(rig.handle.recover(Recovery::Back, deadline), Some(Ok(())));
+    assert_eq!(rig.handle.recover(Recovery::Back, deadline), Some(Ok(true)));
     assert_eq!(rig.see().components[&name("A")].properties[&ident("k")], Value::Float(8.0));
     rig.in_step();
     rig.each_answered_once();

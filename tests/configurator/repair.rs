@@ -142,7 +142,7 @@ impl Bench {
     fn recover_by(&self, direction: Recovery) -> Result<(), String> {
         let deadline = self.rig.clock.now() + Duration::from_secs(20);
         let recovered = self.rig.handle.recover(direction, deadline).expect("an answer");
-        recovered.map_err(|residual| residual.to_string())
+        recovered.map(|_| ()).map_err(|residual| residual.to_string())
     }
 
     fn gain(&self, component: &str) -> Value {

@@ -116,7 +116,7 @@ fn a_component_that_only_takes_something_back_is_there_after_its_call_has_hung()
     assert_eq!(rig.see(), before);
     rig.in_step();
     let deadline = rig.clock.now() + Duration::from_secs(20);
-    assert_eq!(rig.handle.recover(Recovery::Back, deadline), Some(Ok(())));
+    assert_eq!(rig.handle.recover(Recovery::Back, deadline), Some(Ok(true)));
     assert_eq!(rig.see(), before);
     assert_eq!(rig.frames(), ["make", "wire", "run"]);
     assert_eq!(rig.ask("engage"), ["engage.ok"]);
@@ -138,7 +138,7 @@ fn a_platform_that_cannot_be_read_leaves_it_broken_and_unobserved() {
     assert!(!rig.view().broken.as_ref().unwrap().observed);
     rig.platform.set_faults(Faults::default());
     let deadline = rig.clock.now() + Duration::from_secs(20);
-    assert_eq!(rig.handle.recover(Recovery::Back, deadline), Some(Ok(())));
+    assert_eq!(rig.handle.recover(Recovery::Back, deadline), Some(Ok(true)));
     rig.in_step();
     assert_eq!(rig.ask("switch"), ["switch.ok"]);
 }
@@ -157,7 +157,7 @@ fn a_failure_after_an_irreversible_step_is_broken() {
     assert!(rig.view().stack.last().unwrap().partial);
     assert_eq!(rig.ask("burn.undo"), ["burn.undo.failed"], "a floor");
     let deadline = rig.clock.now() + Duration::from_secs(20);
-    assert_eq!(rig.handle.recover(Recovery::Back, deadline), Some(Ok(())), "a person has accepted it");
+    assert_eq!(rig.handle.recover(Recovery::Back, deadline), Some(Ok(true)), "a person has accepted it");
     assert_eq!(rig.ask("burn"), ["burn.ok"]);
     assert_eq!(rig.ask("undo"), ["undo.failed"], "a floor");
 }
@@ -287,7 +287,7 @@ fn a_panic_in_the_configurator_is_answered_and_survived() {
     assert_eq!(residual.left.iter().map(ToString::to_string).collect::<Vec<_>>(), ["stop B"]);
     assert!(residual.difference.is_empty() && view.stack.last().unwrap().partial, "{residual}");
     let deadline = rig.clock.now() + Duration::from_secs(20);
-    assert_eq!(rig.handle.recover(Recovery::Back, deadline), Some(Ok(())));
+    assert_eq!(rig.handle.recover(Recovery::Back, deadline), Some(Ok(true)));
     assert_eq!(rig.see(), before);
     assert_eq!(rig.ask("switch"), ["switch.ok"]);
     for _ in 0..4 {
@@ -427,6 +427,6 @@ fn a_panic_while_something_is_recovered_is_told() {
     assert!(matches!(left.cause, Reason::Panic(_)), "{left}");
     assert!(rig.clock.now() < began + Duration::from_secs(1), "it is told at once");
     rig.wait(1.0);
-    assert_eq!(rig.handle.recover(Recovery::Back, rig.clock.now() + Duration::from_secs(30)), Some(Ok(())));
+    assert_eq!(rig.handle.recover(Recovery::Back, rig.clock.now() + Duration::from_secs(30)), Some(Ok(true)));
     assert_eq!(rig.see(), before);
 }
