@@ -194,7 +194,8 @@ fn show(out: &Output, axes: &[GridAxis], points: &[Vec<&str>], runs: &[PointRun]
             }
         }));
         let style = if run.end == PointEnd::Ok { Style::Good } else { Style::Bad };
-        let why = run.why.as_deref().and_then(|why| why.lines().next());
+        // What failed, and the first reason of it.
+        let why = run.why.as_deref().map(|why| why.lines().take(2).map(str::trim).collect::<Vec<_>>().join("; "));
         row.push(out.paint(style, run.end.word()) + &why.map_or_else(String::new, |why| format!(": {why}")));
         table.row(row);
     }

@@ -488,6 +488,7 @@ fn an_event_and_a_state_that_are_nowhere_are_told_with_those_of_subsystems() {
         ("raise('Drive.faulted')", "did you mean `left/Drive.faulted` or `right/Drive.faulted`?"),
         ("wait_state('lfet:on', 1)", "there is no coordinator `lfet` that could be in `lfet:on`: did you mean `left`?"),
         ("wait_state('left:no', 1)", "has no state `left:no`: known states: "),
+        ("wait_state('left.on', 1)", "no coordinator has a state `left.on`: did you mean `left:on`?"),
     ] {
         demo.write("story.lua", &format!("deploy('pair.yaml') {line}"));
         let ran = demo.run(&["run", "story.lua", "--clock", "simulated", "--quiet"]);

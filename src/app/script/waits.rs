@@ -51,6 +51,10 @@ pub(super) fn wait_state(host: &SharedHost, state: &str, seconds: f64) -> mlua::
             let help = did_you_mean(of, "coordinators", names.iter().map(|name| name.as_str()));
             return Err(error(format!("there is no coordinator `{of}` that could be in `{state}`: {help}")));
         }
+        let meant = state.split_once(['.', '/']).map(|(of, own)| format!("{of}:{own}"));
+        if let Some(meant) = meant.filter(|meant| deployed.knows_state(meant)) {
+            return Err(error(format!("no coordinator has a state `{state}`: did you mean `{meant}`?")));
+        }
         let states = deployed.states();
         let own = state.rsplit(['.', ':']).next().unwrap_or(state);
         let help = did_you_mean(own, "states", states.iter().map(String::as_str));
