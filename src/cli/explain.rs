@@ -2,8 +2,9 @@
 
 use super::exit::Exit;
 use super::flags::{self, Flag};
-use super::output::{Output, Style, Table, text_columns, wrapped};
+use super::output::{Output, Style, Table, text_columns};
 use super::{CommandContext, CommandFailure, CommandResult, Run};
+use crate::diagnostics::wrapped;
 use crate::lang::schema::{self, ReferenceEntry};
 use crate::model::codes::{self, CLI_UNKNOWN_CODE, PAGES, Page};
 use crate::model::finding::{and_also, did_you_mean, nearest};

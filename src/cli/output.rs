@@ -4,7 +4,7 @@
 //! answer stands. Anything else that keeps words from being written (a full disk) is remembered, and the command's end
 //! says so.
 
-use crate::diagnostics::{SourceMap, render};
+use crate::diagnostics::{SourceMap, render, wrapped};
 use crate::model::finding::count;
 use crate::model::{Finding, Severity};
 use serde::Serialize;
@@ -317,32 +317,6 @@ pub fn fitting(page: &str, columns: usize, rows: usize) -> String {
 /// How long lines of text are: 100, or what the terminal has.
 pub fn text_columns() -> usize {
     terminal_columns().map_or(100, |columns| columns.clamp(LEAST_TEXT, 100))
-}
-
-/// `text` in lines of at most `columns`, each behind `indent` blanks; its own line breaks stay.
-pub fn wrapped(text: &str, columns: usize, indent: usize) -> String {
-    let mut out = String::new();
-    for line in text.lines() {
-        let mut used = 0;
-        for word in line.split_whitespace() {
-            let long = width(word);
-            if used > indent && used + 1 + long > columns {
-                out.push('\n');
-                used = 0;
-            }
-            if used == 0 {
-                out.push_str(&" ".repeat(indent));
-                used = indent;
-            } else {
-                out.push(' ');
-                used += 1;
-            }
-            out.push_str(word);
-            used += long;
-        }
-        out.push('\n');
-    }
-    out
 }
 
 /// Characters of `text` that a terminal shows.

@@ -290,11 +290,12 @@ fn own(out: &Output, status: &Json, part: &FilePart<'_>, monitors: &[Json]) -> S
     if !part.waiting.is_empty() {
         page += &format!("waiting for  {}\n", part.waiting.join(", "));
     }
-    let frames: Vec<String> = part.frames.iter().map(|frame| framed(out, frame)).collect();
-    let stack = match frames.is_empty() {
+    let frames: Vec<String> = part.frames.iter().rev().map(|frame| framed(out, frame)).collect();
+    let stack = match frames.len() {
         _ if status["stack"].is_null() => out.paint(Style::Bad, not_known()),
-        true => "empty".to_owned(),
-        false => frames.join(", "),
+        0 => "empty".to_owned(),
+        1 => frames.join(""),
+        _ => frames.join(", ") + &out.paint(Style::Dim, ", newest first"),
     };
     page += &format!("stack        {stack}\n");
     if part.path.is_empty() {

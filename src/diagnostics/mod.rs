@@ -10,9 +10,11 @@ mod render;
 mod source_file;
 mod source_map;
 mod tokens;
+mod wrap;
 mod yaml_extent;
 
 pub use render::{RenderOptions, render, render_with, to_json};
 pub use source_file::{FileId, Language, Location, SourceFile};
 pub use source_map::SourceMap;
 pub use tokens::{LuaToken, next_token};
+pub use wrap::wrapped;

@@ -2,6 +2,7 @@
 
 use super::source_file::{FileId, Location};
 use super::source_map::SourceMap;
+use super::wrap;
 use crate::model::finding::count;
 use crate::model::{Finding, Origin, Severity};
 use miette::{
@@ -12,6 +13,7 @@ use std::borrow::Cow;
 use std::fmt::{self, Write as _};
 use std::ops::Range;
 use std::sync::Arc;
+use textwrap::WordSplitter;
 
 /// How findings are shown.
 #[derive(Debug, Clone, Copy)]
@@ -40,6 +42,8 @@ pub fn render_with(findings: &[Finding], sources: &SourceMap, options: RenderOpt
     let theme = if options.color { GraphicalTheme::unicode() } else { GraphicalTheme::unicode_nocolor() };
     let handler = GraphicalReportHandler::new_themed(theme)
         .with_width(options.width.max(30))
+        .with_word_separator(wrap::SEPARATOR)
+        .with_word_splitter(WordSplitter::NoHyphenation)
         .with_links(false)
         .with_context_lines(1)
         .without_cause_chain();

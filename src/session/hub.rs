@@ -421,7 +421,7 @@ impl Hub {
         match leaves[..] {
             [] => "the coordinator is in `no state`".to_owned(),
             [ref leaf] => format!("the coordinator is in {leaf}"),
-            _ => format!("the coordinators are in {}", leaves.join(" and ")),
+            [ref before @ .., ref last] => format!("the coordinators are in {} and {last}", before.join(", ")),
         }
     }
 

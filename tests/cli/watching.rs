@@ -142,7 +142,7 @@ fn a_terminal_that_is_stopped_is_nothing_to_the_deployment() {
     let watch = Foreground::start(&mut command);
     drop(command);
     let seen = read_until(&mut person, "missed");
-    for words in ["demo  up", "root.operational.slow_mode", "stack        create_all", "source", "high", "control"] {
+    for words in ["demo  up", "root.operational.slow_mode", ", newest first", "source", "high", "control"] {
         assert!(seen.contains(words), "{words}: {seen}");
     }
     // It is drawn anew, where it was: lines are cleared for that.
