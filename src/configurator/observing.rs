@@ -14,6 +14,7 @@ use crate::stack::{Broken, Frame};
 use crate::system::touch::{self, Access, Slot, touches};
 use crate::system::{self, View as _};
 use rustc_hash::FxHashSet;
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 impl Engine {
@@ -187,6 +188,7 @@ impl Engine {
             // What a stranger did is not taken back unasked.
             mendable: false,
             expected,
+            guests: BTreeSet::new(),
             seen: None,
         });
         self.changed();

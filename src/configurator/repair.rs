@@ -13,6 +13,7 @@ use crate::plan::undo::in_order;
 use crate::stack::{Edits, FrameId, Group, HandOver, Inverse, Residual, Why, keeps_still};
 use crate::system::{self, View as _, step, touch};
 use crate::transaction::{BrokenPart, PartEnd, Spec, Transaction};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 /// Who has something repaired.
@@ -71,6 +72,7 @@ impl Engine {
                         frame: None,
                         instead: None,
                         expected: Snapshot::default(),
+                        guests: BTreeSet::new(),
                         gone: Edits::default(),
                         also: Vec::new(),
                     }));

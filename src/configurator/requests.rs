@@ -274,7 +274,7 @@ impl Engine {
 
     /// What is left of a request that ended *broken*: its partial frame, and what is not known.
     pub(super) fn left_broken(&mut self, request: &Request, broken: BrokenPart, since: FrameId) {
-        let BrokenPart { residual, frame, instead, expected, gone, also } = broken;
+        let BrokenPart { residual, frame, instead, expected, guests, gone, also } = broken;
         // What was to be undone with it has each its own.
         self.world.stack.apply([&gone], &[]);
         for frame in also {
@@ -298,8 +298,8 @@ impl Engine {
                 Ask::Apply(id) | Ask::UndoOf(id) => Some((id, request.requester)),
                 _ => None,
             };
-            let broken = Broken { residual, components, culprit, frame, mendable: true, expected, seen: None };
-            self.world.breaks(broken);
+            let broken = Broken { residual, components, culprit, frame, mendable: true, expected, guests, seen: None };
+            self.world.ends_broken(broken);
         }
         self.changed();
     }

@@ -7,11 +7,11 @@ use super::engine::Engine;
 use super::request::{Reason, Request};
 use super::running::{Purpose, Running};
 use super::safety::{Troubled, coming};
-use crate::model::{Ask, ComponentName, ConfigId, Step, Target, Verdict};
-use crate::stack::{BestEffort, Frame, Planned, Residual, SafeEnd, Stack, effort};
+use crate::model::{Ask, ConfigId, Step, Target, Verdict};
+use crate::stack::{BestEffort, Frame, Planned, Residual, SafeEnd, Stack, components, effort, shares};
 use crate::system::touch::{Slot, slot};
 use crate::system::{System, step, touch};
-use crate::transaction::{BrokenPart, Input, PartEnd, Spec, Touched, Transaction};
+use crate::transaction::{BrokenPart, Input, OpenStep, PartEnd, Spec, Touched, Transaction};
 use smallvec::SmallVec;
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -145,13 +145,24 @@ impl Engine {
         stack
     }
 
-    /// Components for which safe configurations that came before have steps that are not over.
-    pub(super) fn busy_before(&self, running: &Running) -> Vec<ComponentName> {
+    /// The steps of safe configurations that came before which are not over.
+    pub(super) fn busy_before(&self, running: &Running) -> Vec<OpenStep> {
         if running.after.is_empty() {
             return Vec::new();
         }
         let before = self.running.iter().filter(|other| running.after.contains(&other.number));
-        before.flat_map(|other| other.machine.open_steps()).flat_map(touch::components).collect()
+        before.flat_map(|other| other.machine.still_to_do()).collect()
+    }
+
+    /// Whether what a safe configuration under way does to the stack counts on what one does that came before.
+    pub(super) fn counts_on(later: &Running, before: &Running) -> bool {
+        let (Purpose::Safe(own), Purpose::Safe(other)) = (&later.purpose, &before.purpose) else { return true };
+        let coming = coming(before.number);
+        let pops = &later.machine.planned().parts[0].edits.pops;
+        let (own, other) = (&own.1, &other.1);
+        own.group.is_some() && own.group == other.group
+            || shares(other, own)
+            || pops.iter().any(|(frame, hand)| *frame == coming || hand.takers().any(|taker| taker == coming))
     }
 
     /// Whether a safe configuration interrupts what is under way here: what claims something of its (sub)system, and whatever
@@ -227,8 +238,15 @@ impl Engine {
         // What failed of it is nothing that it keeps.
         self.world.stack.frame(pushed).into_iter().for_each(|frame| touched.leaves(frame));
         if let Some(part) = &broken {
-            // Those that came later took what this one was to do for done.
-            let later = self.running.iter().filter(|other| other.after.contains(&number));
+            // Those that came later took what this one was to do about the same components for done.
+            let about = |other: &&Running| match &other.purpose {
+                Purpose::Safe(safe) => {
+                    let own = components(&safe.1.footprint);
+                    missed.iter().flat_map(touch::components).any(|component| own.contains(&component))
+                }
+                _ => false,
+            };
+            let later = self.running.iter().filter(|other| other.after.contains(&number)).filter(about);
             let served: Vec<_> = later.flat_map(|other| other.serves.iter().copied()).collect();
             for troubled in self.safety.troubles.iter_mut().filter(|other| served.contains(&other.request)) {
                 let why = Reason::Broken(part.residual.clone());
@@ -275,7 +293,8 @@ impl Engine {
     /// What was interrupted goes back, once no safe configuration is being applied any more.
     pub(super) fn release(&mut self, touched: Touched) {
         self.safety.touched.join(touched);
-        if self.running.iter().any(|running| running.is_safe() && !running.over) {
+        // Also one that is over and is still to be booked.
+        if self.running.iter().any(Running::is_safe) {
             return;
         }
         self.safety.pushed.clear();

@@ -12,6 +12,7 @@ use crate::system::{self, Reversibility, System, Undo};
 use crate::time::Time;
 use crate::transaction::{Input, Limit, Spec, Transaction};
 use smallvec::SmallVec;
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 impl Engine {
@@ -107,6 +108,7 @@ impl Engine {
                 frame: None,
                 mendable: true,
                 expected: crate::model::Snapshot::default(),
+                guests: BTreeSet::new(),
                 seen: None,
             });
         }

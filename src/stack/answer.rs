@@ -7,6 +7,7 @@ use crate::model::finding::count;
 use crate::model::{Cause, ComponentName, ConfigId, EventName, Finding, Findings, Step, Verdict};
 use crate::system::{System, UnknownType, step};
 use crate::time::Time;
+use std::collections::BTreeSet;
 use std::fmt;
 use std::sync::Arc;
 use std::time::Duration;
@@ -220,6 +221,16 @@ impl Residual {
             other => [other.component(); 2],
         };
         steps.flat_map(of).chain(self.faulted.iter().copied())
+    }
+}
+
+impl Residual {
+    /// Components that differ in nothing but a connection to one of these `own`, or to another one that differs.
+    pub fn guests(&self, own: &[ComponentName]) -> BTreeSet<ComponentName> {
+        let connects = |step: &Step| matches!(step, Step::Connect { .. } | Step::Disconnect { .. });
+        let others = self.difference.iter().chain(&self.unsettled).filter(|step| !connects(step));
+        let others: Vec<ComponentName> = others.map(Step::component).chain(self.faulted.iter().copied()).collect();
+        self.components().filter(|component| !own.contains(component) && !others.contains(component)).collect()
     }
 }
 

@@ -3,6 +3,7 @@
 //! It is planned whole where that goes; else piece by piece, each piece by itself. What concerns a component that is not
 //! there has nothing to be made safe, and is left out.
 
+use super::net;
 use super::share::{self, HandOver, shares};
 use super::squash::{list, squash};
 use super::void::rest;
@@ -44,10 +45,16 @@ pub fn effort(
     let scope = request.scope.filter(|_| !request.gone);
     let op = Op::Push { configuration, requester: request.requester, at, scope };
     match transaction(system, stack, &[op], context) {
-        Ok(planned) => match planned.parts[0].edits.push.as_deref().cloned() {
-            Some(frame) => BestEffort { planned, frame: Frame { left: request.gone, ..frame }, troubles: Vec::new() },
-            None => piecewise(system, configuration, request, at, context),
-        },
+        Ok(mut planned) => {
+            let Some(frame) = planned.parts[0].edits.push.as_deref().cloned() else {
+                return piecewise(system, configuration, request, at, context);
+            };
+            if !planned.of.is_empty() {
+                let steps: &mut Vec<PlannedStep> = Arc::make_mut(&mut planned.steps);
+                net::components_side_by_side(steps);
+            }
+            BestEffort { planned, frame: Frame { left: request.gone, ..frame }, troubles: Vec::new() }
+        }
         Err(_) => piecewise(system, configuration, request, at, context),
     }
 }

@@ -31,6 +31,11 @@ impl Broken {
         }
     }
 
+    /// The components of which it is known what they are expected to be.
+    fn own(&self) -> Vec<ComponentName> {
+        self.components.difference(&self.guests).copied().collect()
+    }
+
     /// Whether it is expected as this safe configuration had left it: that came before it was seen otherwise.
     fn goes_by(&self, frame: &Frame) -> bool {
         self.seen.as_ref().is_some_and(|seen| frame.id <= seen.newest)
@@ -87,11 +92,23 @@ impl World {
     /// The same of what was seen by looking, while the model had everything as it was wanted: also what safe configurations in
     /// force had written, which is not there then.
     pub fn is_otherwise(&mut self, mut broken: Broken) {
-        let slots = self.overwritten(&broken).map(|(_, saved)| saved.slot);
-        let written = slots.filter_map(|slot| Some((slot, broken.expects(slot)?))).collect();
-        broken.seen =
-            self.stack.frames().iter().map(|frame| frame.id).max().map(|newest| SafeWrites { newest, written });
+        broken.seen = self.had_written(&broken, &|_| true);
         self.breaks(broken);
+    }
+
+    /// The same of what has ended so. What safe configurations in force had written, as far as the model knew, may differ as well: a false *done*.
+    pub fn ends_broken(&mut self, mut broken: Broken) {
+        let differs = |slot: Slot| broken.residual.difference.iter().any(|step| absolute(step) == Some(slot));
+        let seen = self.had_written(&broken, &differs).filter(|seen| !seen.written.is_empty());
+        broken.seen = seen;
+        self.breaks(broken);
+    }
+
+    /// What safe configurations in force had written of something broken, as it was expected. None: nothing is in force.
+    fn had_written(&self, broken: &Broken, counts: &dyn Fn(Slot) -> bool) -> Option<SafeWrites> {
+        let slots = self.overwritten(broken).map(|(_, saved)| saved.slot).filter(|slot| counts(*slot));
+        let written = slots.filter_map(|slot| Some((slot, broken.expects(slot)?))).collect();
+        self.stack.frames().iter().map(|frame| frame.id).max().map(|newest| SafeWrites { newest, written })
     }
 
     /// What safe configurations in force wrote of something broken.
@@ -115,8 +132,7 @@ impl World {
     /// Puts something broken into `system` as the model has it; what a safe configuration in force has written of it is as
     /// that wrote it.
     pub fn put_meant(&self, broken: &Broken, system: &mut System) {
-        let components: Vec<ComponentName> = broken.components.iter().copied().collect();
-        let _ = system.adopt(&components, &broken.expected);
+        let _ = system.adopt(&broken.own(), &broken.expected);
         self.put_left_by_safe(broken, system);
     }
 
@@ -167,7 +183,7 @@ impl World {
             let above = || before[at + 1..].iter().filter(|above| !above.safe && !popped(above));
             let items = list(&before[at]);
             for broken in &mut self.broken {
-                let components: Vec<ComponentName> = broken.components.iter().copied().collect();
+                let components = broken.own();
                 let mut meant = self.system.clone();
                 if meant.adopt(&components, &broken.expected).is_err() {
                     continue;

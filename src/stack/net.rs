@@ -62,6 +62,27 @@ pub(super) fn shorter(
     view.same(end).then_some(net)
 }
 
+/// Of a list whose steps wait for each other one by one: values and calls wait only for those of their own component, and for what makes, drops,
+/// moves or connects one. What is made safe on one component does not wait until another one has answered.
+pub(super) fn components_side_by_side(steps: &mut [PlannedStep]) {
+    let mut barrier: Option<StepId> = None;
+    let mut last: FxHashMap<ComponentName, StepId> = FxHashMap::default();
+    for planned in steps {
+        planned.after = match &planned.step {
+            Step::PropertySet { .. } | Step::PortWrite { .. } | Step::Operation(_) => {
+                last.insert(planned.step.component(), planned.id).or(barrier).into_iter().collect()
+            }
+            _ => {
+                let mut before: SmallVec<[StepId; 4]> = last.drain().map(|(_, id)| id).collect();
+                before.sort_unstable();
+                before.extend(barrier.filter(|_| before.is_empty()));
+                barrier = Some(planned.id);
+                before
+            }
+        };
+    }
+}
+
 /// Absolute writes: only the last one to a slot counts, none to a component that is destroyed afterwards, and none of the
 /// value that is there. No precondition depends on what a property or a port holds, so leaving one out harms nothing; but when a
 /// rival is configured, its properties say what it holds.

@@ -21,8 +21,10 @@ pub struct Broken {
     pub frame: Option<FrameId>,
     /// May be mended without being asked, when a component comes back.
     pub mendable: bool,
-    /// The components as the model has them.
+    /// The components as the model has them, but for guests.
     pub expected: Snapshot,
+    /// Those of them that are only at the other end of a connection which differs: nothing else is expected of them, and others go on with them.
+    pub guests: BTreeSet<ComponentName>,
     /// What safe configurations had done, where what is broken was seen by looking: the model had that too. None: what is there
     /// of theirs is as they left it.
     pub seen: Option<SafeWrites>,

@@ -9,6 +9,7 @@ use crate::stack::{Edits, Ending, Frame, FrameId, Inverse, Part, Reason, Residua
 use crate::system::touch::Access;
 use crate::system::{Overlay, System, Undo, View as _, step, touch};
 use rustc_hash::FxHashSet;
+use std::collections::BTreeSet;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -68,6 +69,8 @@ pub struct BrokenPart {
     pub instead: Option<FrameId>,
     /// The components of which not all is known, as the model has them.
     pub expected: Snapshot,
+    /// See [`Broken::guests`](crate::stack::Broken::guests).
+    pub guests: BTreeSet<ComponentName>,
     /// What was to be undone with it: frames that are gone all the same, and what is left of others.
     pub gone: Edits,
     /// Each in the place of that of its number.
@@ -351,8 +354,16 @@ impl Transaction {
     /// The end of a part of which nothing is left, but which was broken off: nobody vouches for it.
     fn broken_whole(&self, observed: bool) -> PartEnd {
         let residual = Arc::new(Residual { observed, ..Residual::of(self.reason()) });
-        let (expected, gone) = (Snapshot::default(), Edits::default());
-        PartEnd::Broken(Box::new(BrokenPart { residual, frame: None, instead: None, expected, gone, also: Vec::new() }))
+        let (expected, guests, gone) = (Snapshot::default(), BTreeSet::new(), Edits::default());
+        PartEnd::Broken(Box::new(BrokenPart {
+            residual,
+            frame: None,
+            instead: None,
+            expected,
+            guests,
+            gone,
+            also: Vec::new(),
+        }))
     }
 
     /// Parts before `part` that do not stand: a call of theirs was neither done nor finished, or what they lead to is not
@@ -416,8 +427,9 @@ impl Transaction {
         // A safe configuration that is being undone demands nothing any more of what is back, and perhaps broken.
         let demands = !(undone && planned.frame.as_ref().is_some_and(|frame| frame.safe));
         let left: FxHashSet<ComponentName> = residual.components().filter(|_| demands).collect();
-        // With what is connected to one of its own, and differs in that.
-        let about: Vec<ComponentName> = self.own().into_iter().chain(residual.components()).collect();
+        let mut about = self.own();
+        let guests = residual.guests(&about);
+        about.extend(residual.components().filter(|component| !guests.contains(component)));
         let expected = wanted.snapshot_some(&about);
         let irreversible = residual.irreversible.first().cloned();
         let floor = irreversible.map(|step| format!("`{step}` cannot be undone"));
@@ -433,7 +445,7 @@ impl Transaction {
         // Of a frame that was being undone nothing is: it stays as it is.
         let frame = frame.filter(|_| !(whole && undone));
         let (gone, also) = if whole { (Edits::default(), Vec::new()) } else { self.of_along(planned) };
-        PartEnd::Broken(Box::new(BrokenPart { residual, frame, instead, expected, gone, also }))
+        PartEnd::Broken(Box::new(BrokenPart { residual, frame, instead, expected, guests, gone, also }))
     }
 
     /// What is still to be undone of a frame; so is what safe configurations have done again, for whom it never was, and a

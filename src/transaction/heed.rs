@@ -2,6 +2,7 @@
 //! never overwritten, and what is brought back comes back as they want it.
 
 use super::Transaction;
+use super::messages::OpenStep;
 use super::touched::Touched;
 use crate::model::{ComponentName, RunState, Step, Transition, Wanted};
 use crate::plan::PlannedStep;
@@ -46,7 +47,12 @@ impl Transaction {
 
     /// The steps of a best effort that are not over.
     pub fn open_steps(&self) -> impl Iterator<Item = &Step> {
-        self.forward.open().map(|planned| &planned.step)
+        self.forward.open().map(|(planned, _)| &planned.step)
+    }
+
+    /// The same, each with whether it is out.
+    pub fn still_to_do(&self) -> impl Iterator<Item = OpenStep> + '_ {
+        self.forward.open().map(|(planned, begun)| OpenStep { step: planned.step.clone(), begun })
     }
 
     /// Values that are on their way to the platform, of steps that are out: nobody knows whether they are there.

@@ -3,6 +3,7 @@
 use super::touched::Touched;
 use crate::model::{ComponentName, ConfigId, Execution, Outcome, Snapshot, Step};
 use crate::stack::Reason;
+use crate::system::touch::{self, absolute};
 use smallvec::SmallVec;
 
 /// What whoever drives it can do now.
@@ -15,8 +16,34 @@ pub struct Can<'a> {
     pub room: bool,
     /// Components whose call has not returned.
     pub quarantined: &'a [ComponentName],
-    /// Components that an earlier safe configuration has steps for: a later one's come after these.
-    pub busy: &'a [ComponentName],
+    /// What earlier safe configurations have still to do: what a later one does there comes after it.
+    pub busy: &'a [OpenStep],
+}
+
+/// A step of an earlier safe configuration that is not over.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OpenStep {
+    /// The step.
+    pub step: Step,
+    /// It is out.
+    pub begun: bool,
+}
+
+impl OpenStep {
+    /// Whether `later` comes after it. A value or a call does not wait for a value of the same component that has not even begun, nor a value for
+    /// such a call: these may wait for another component, which does not answer.
+    pub fn is_before(&self, later: &Step) -> bool {
+        let own = touch::components(later);
+        if !touch::components(&self.step).iter().any(|component| own.contains(component)) {
+            return false;
+        }
+        let (value, call) = (|step: &Step| absolute(step).is_some(), |step: &Step| matches!(step, Step::Operation(_)));
+        let apart = match value(&self.step) {
+            true => value(later) && absolute(&self.step) != absolute(later) || call(later),
+            false => call(&self.step) && value(later),
+        };
+        self.begun || !apart
+    }
 }
 
 /// How a step gets to the platform.

@@ -33,7 +33,7 @@ pub use end::{BrokenPart, PartEnd, TransactionEnd};
 pub use endings::{Stopping, can_fail, endings};
 pub use immediate::Doing;
 pub use limits::{Limit, Spec};
-pub use messages::{Can, Input, Poll, Question};
+pub use messages::{Can, Input, OpenStep, Poll, Question};
 pub use touched::Touched;
 
 use crate::model::{ComponentName, Outcome, Snapshot, Step};

@@ -101,8 +101,9 @@ impl StepsRun {
     }
 
     /// The steps that are not over.
-    pub fn open(&self) -> impl Iterator<Item = &PlannedStep> {
-        self.list.iter().zip(&self.state).filter(|(_, state)| **state != StepState::Over).map(|(step, _)| step)
+    pub fn open(&self) -> impl Iterator<Item = (&PlannedStep, bool)> {
+        let open = self.list.iter().zip(&self.state).filter(|(_, state)| **state != StepState::Over);
+        open.map(|(step, state)| (step, *state != StepState::Waiting))
     }
 
     /// Leaves out what has not begun and `out` says so of. Answers whether there was such.
@@ -449,7 +450,7 @@ fn makes_or_drops(step: &Step) -> bool {
 
 /// Whether a step comes after what an earlier safe configuration still does.
 fn is_busy(step: &Step, can: &Can<'_>) -> bool {
-    !can.busy.is_empty() && components(step).iter().any(|component| can.busy.contains(component))
+    can.busy.iter().any(|open| open.is_before(step))
 }
 
 /// Why the precondition of a step is false on the model, if it is.

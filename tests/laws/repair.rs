@@ -78,6 +78,7 @@ fn one_net_ends_in_the_same_system_and_moves_nothing_to_and_fro() {
             frame: None,
             mendable: false,
             expected,
+            guests: std::collections::BTreeSet::new(),
             seen: None,
         });
         prop_assert!(diff(&world.as_meant(&world.broken[0]), &model).is_empty(), "what is meant is the model");
