@@ -110,8 +110,10 @@ pub enum Progress {
     Emptied(Ident),
     /// A later look at the platform shows otherwise what nothing was under way with.
     Differs(Arc<Residual>),
-    /// A broken system is whole again.
+    /// Something broken is right again.
     Recovered,
+    /// It was tried, and something still is not.
+    NotRecovered,
     /// The configurator itself failed, and goes on.
     Survived(String),
     /// So many calls have not returned that no further one is made, but for what is safe: told once until one comes back.

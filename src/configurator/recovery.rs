@@ -116,14 +116,14 @@ impl Engine {
         if !self.running.is_empty() {
             return Err(Arc::new(Residual::of(Reason::Busy)));
         }
-        match direction {
+        let recovered = match direction {
             Recovery::Back => self.recover_back(),
             Recovery::Accept => self.recover_accept(),
-        }?;
+        };
         if let Some(progress) = &self.given.progress {
-            progress(&Progress::Recovered);
+            progress(if recovered.is_ok() { &Progress::Recovered } else { &Progress::NotRecovered });
         }
-        Ok(true)
+        recovered.map(|()| true)
     }
 
     /// Takes what is there as the state, and gives the stack up.

@@ -97,7 +97,7 @@ pub enum Happening {
         /// Why, one line each.
         reasons: Vec<String>,
     },
-    /// A broken system is whole again.
+    /// Something broken is right again.
     Recovered {
         /// The steps that nobody's request stands for and that were carried out since the last time.
         steps: Vec<StepTime>,
@@ -179,6 +179,14 @@ pub struct StepTime {
     pub end: StepEnd,
     /// How long it took; none: it was not measured by itself.
     pub took: Option<Duration>,
+}
+
+impl StepTime {
+    /// As it is told in a line: `` `start A` (done) ``.
+    pub fn told(&self) -> String {
+        let undo = if self.undoing { "undo: " } else { "" };
+        format!("`{undo}{}` ({})", self.step, self.end)
+    }
 }
 
 /// `{"step": "undo: start A", "outcome": "not done", "took_us": 1.5}`; without `took_us` where it was not measured.

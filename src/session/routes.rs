@@ -389,6 +389,13 @@ pub(super) fn on_progress(hub: &Hub, junction: &Junction, steps: &Steps, progres
         Progress::Recovered => {
             hub.note(Happening::Recovered { steps: steps.take(RequestId(0)) });
         }
+        Progress::NotRecovered => {
+            // What was done for it belongs to no later one.
+            let done: Vec<String> = steps.take(RequestId(0)).iter().map(StepTime::told).collect();
+            if !done.is_empty() {
+                hub.note(Happening::Noted { note: format!("done to recover: {}", done.join(", ")) });
+            }
+        }
         Progress::Started(_) | Progress::Answered(_) => {}
     }
 }

@@ -1,12 +1,11 @@
 //! How a transaction ends: what was done is compared with what is there, and what is left is named.
 
 use super::heed::Heed;
+use super::partial::{demand_no_more, partial};
 use super::{Can, Transaction, TransactionPhase};
 use crate::model::{Cause, ComponentName, RunState, Snapshot, Step};
-use crate::plan::footprint::{Footprint, Slot};
 use crate::plan::undo::DraftStep;
-use crate::stack::{Edits, Ending, Frame, FrameId, Inverse, Part, Reason, Residual};
-use crate::system::touch::Access;
+use crate::stack::{Edits, Ending, Frame, FrameId, Part, Reason, Residual};
 use crate::system::{Overlay, System, Undo, View as _, step, touch};
 use rustc_hash::FxHashSet;
 use std::collections::BTreeSet;
@@ -474,38 +473,5 @@ impl Transaction {
             }
         }
         (gone, also)
-    }
-}
-
-/// Of the run states that are back where they were before it a partial frame says nothing any more.
-fn demand_no_more(frame: &mut Frame) {
-    let open = |component: ComponentName| frame.moved(component).is_some();
-    let touches = frame.footprint.touches.iter().copied();
-    let touches =
-        touches.filter(|touch| !matches!(touch.slot, Slot::State(of) if touch.access == Access::Write && !open(of)));
-    frame.footprint = Arc::new(Footprint { touches: touches.collect() });
-}
-
-/// A frame of which only `items` are left to be undone; it is about these, and about `also`.
-fn partial(frame: &Frame, items: Vec<DraftStep>, also: &FxHashSet<ComponentName>, floor: Option<String>) -> Frame {
-    let mut components: FxHashSet<ComponentName> =
-        items.iter().flat_map(|item| touch::components(&item.step)).collect();
-    components.extend(also);
-    let slots: FxHashSet<_> = items.iter().filter_map(|item| touch::absolute(&item.step)).collect();
-    let about = |component: &ComponentName| components.contains(component);
-    let touches = (frame.footprint.touches.iter())
-        .filter(|touch| {
-            let (a, b) = touch.slot.components();
-            about(&a) || about(&b)
-        })
-        .copied()
-        .collect();
-    Frame {
-        inverse: Inverse::List(Arc::new(items)),
-        footprint: Arc::new(Footprint { touches }),
-        saved: frame.saved.iter().filter(|saved| slots.contains(&saved.slot)).cloned().collect(),
-        floor,
-        partial: true,
-        ..frame.clone()
     }
 }

@@ -24,6 +24,7 @@ mod limits;
 mod mending;
 mod messages;
 mod order;
+mod partial;
 mod run;
 mod settle;
 mod stand;

@@ -3,6 +3,7 @@
 mod agree;
 mod answered;
 mod apart;
+mod at_once;
 mod background;
 mod booked;
 mod breakages;

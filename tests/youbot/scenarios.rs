@@ -8,9 +8,10 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Each with what is set for it here: what takes a minute in the file is shorter.
-const SCENARIOS: [(&str, &[(&str, &str)]); 33] = [
+const SCENARIOS: [(&str, &[(&str, &str)]); 34] = [
     ("beside", &[]),
     ("blocked", &[]),
+    ("jammed", &[]),
     ("bring_up", &[]),
     ("clocks", &[]),
     ("configurator", &[]),
@@ -109,6 +110,11 @@ fn beside() {
 #[test]
 fn blocked() {
     run("blocked");
+}
+
+#[test]
+fn jammed() {
+    run("jammed");
 }
 
 #[test]

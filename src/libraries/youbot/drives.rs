@@ -281,10 +281,12 @@ impl Drives {
         self.stop();
     }
 
-    /// Whatever is under way ends, as with [`hold`](Self::hold), of what moves or takes torques. Drives that are off stay off: the arm is on its stops, or sinks onto them. Those
-    /// that hold already, or come to rest, go on with that: held anew each time, the arm would give way under a load.
+    /// Whatever is under way ends, as with [`hold`](Self::hold), of what moves or takes torques, and of an arm that sinks since its drives went
+    /// off. Drives that are off stay off where the arm rests. Those that hold already, or come to rest, go on with that: held anew each time, the
+    /// arm would give way under a load.
     pub fn stop(&mut self) {
-        if self.busy() || self.mode == DriveMode::Torque {
+        let sinks = self.mode == DriveMode::MotorStop && !self.is_carried();
+        if self.busy() || self.mode == DriveMode::Torque || sinks {
             self.hold();
         }
     }

@@ -1,6 +1,6 @@
 //! How an arm comes to rest that is to be held: along a ramp, without driving on into what it meets.
 
-use super::{Drives, JOINTS, SPEED_GAIN};
+use super::{Drives, JOINTS, POSITION_GAIN, SPEED_GAIN};
 use crate::libraries::youbot::base::{Pose2, Twist2};
 use crate::libraries::youbot::handover::{QUICK_STOP, slowed};
 use crate::libraries::youbot::kinematics::Tool;
@@ -31,6 +31,9 @@ impl Drives {
             if self.settles > 0.0 || rolling.as_ref().is_some_and(|rolling| rolling.pushes(i, off)) {
                 self.target[i] = self.measured.q[i];
             }
+            // Pushed further than the drive can hold, it stays there: it would be flung back when it is let go.
+            let lead = self.parameters.tau_max[i] / POSITION_GAIN[i];
+            self.target[i] = self.target[i].clamp(self.measured.q[i] - lead, self.measured.q[i] + lead);
         }
         self.target += self.target_speed * dt;
     }
