@@ -279,10 +279,7 @@ impl Engine {
 
     /// The next that is over and is answered. Of one moment: safe configurations first, then in the order in which they began.
     fn next_over(&self) -> Option<u64> {
-        let waits = |running: &Running| {
-            let mut before = self.running.iter().filter(|other| running.after.contains(&other.number));
-            before.any(|other| Self::counts_on(running, other))
-        };
+        let waits = |running: &Running| self.running.iter().any(|other| running.after.contains(&other.number));
         let over = self.running.iter().filter(|running| running.over && !matches!(running.purpose, Purpose::Own));
         let over = over.filter(|running| !waits(running));
         over.min_by_key(|running| (!running.is_safe(), running.number)).map(|running| running.number)

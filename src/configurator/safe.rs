@@ -8,7 +8,7 @@ use super::request::{Reason, Request};
 use super::running::{Purpose, Running};
 use super::safety::{Troubled, coming};
 use crate::model::{Ask, ConfigId, Step, Target, Verdict};
-use crate::stack::{BestEffort, Frame, Planned, Residual, SafeEnd, Stack, components, effort, shares};
+use crate::stack::{BestEffort, Frame, Planned, Residual, SafeEnd, Stack, components, effort};
 use crate::system::touch::{Slot, slot};
 use crate::system::{System, step, touch};
 use crate::transaction::{BrokenPart, Input, OpenStep, PartEnd, Spec, Touched, Transaction};
@@ -152,17 +152,6 @@ impl Engine {
         }
         let before = self.running.iter().filter(|other| running.after.contains(&other.number));
         before.flat_map(|other| other.machine.still_to_do()).collect()
-    }
-
-    /// Whether what a safe configuration under way does to the stack counts on what one does that came before.
-    pub(super) fn counts_on(later: &Running, before: &Running) -> bool {
-        let (Purpose::Safe(own), Purpose::Safe(other)) = (&later.purpose, &before.purpose) else { return true };
-        let coming = coming(before.number);
-        let pops = &later.machine.planned().parts[0].edits.pops;
-        let (own, other) = (&own.1, &other.1);
-        own.group.is_some() && own.group == other.group
-            || shares(other, own)
-            || pops.iter().any(|(frame, hand)| *frame == coming || hand.takers().any(|taker| taker == coming))
     }
 
     /// Whether a safe configuration interrupts what is under way here: what claims something of its (sub)system, and whatever

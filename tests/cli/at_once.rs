@@ -86,10 +86,10 @@ fn two_that_end_at_one_moment_leave_a_stack_that_leads_back() {
 fn one_that_hangs_elsewhere_keeps_none_waiting() {
     let told = said(
         "apply('gentle', {force = true}) wait(1) fault('property_set l.limit', 'hang', 1) apply('still') wait(0.05)
-         apply('stop') wait_answer('stop.ok', 0.01) say('speed ' .. port('r.speed') .. ' ' .. property('r.limit')) wait(2)
+         apply('stop') wait(0.01) say('speed ' .. port('r.speed') .. ' ' .. property('r.limit')) wait_answer('stop.ok', 2)
          for _, frame in ipairs(stack()) do say(frame.configuration .. ' ' .. tostring(frame.partial)) end",
     );
-    assert_eq!(told, ["speed 0.0 0.02", "build false", "stop false", "still true"]);
+    assert_eq!(told, ["speed 0.0 0.02", "build false", "still true", "stop false"]);
 }
 
 /// What it had said to be done is not, and is found so with what it has interrupted: it is written again, and not taken for what was there before.
