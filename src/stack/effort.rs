@@ -43,33 +43,18 @@ pub fn effort(
     let there = of_what_is_there(system, configuration);
     let configuration = &*there;
     let scope = request.scope.filter(|_| !request.gone);
-    let push = |configuration: &Configuration| {
-        let op = Op::Push { configuration, requester: request.requester, at, scope };
-        let planned = transaction(system, stack, &[op], context).ok()?;
-        let frame = planned.parts[0].edits.push.as_deref().cloned()?;
-        Some((planned, frame))
-    };
-    let Some((mut planned, mut frame)) = push(configuration) else {
+    let op = Op::Push { configuration, requester: request.requester, at, scope };
+    let Ok(mut planned) = transaction(system, stack, &[op], context) else {
         return piecewise(system, configuration, request, at, context);
     };
-    // Nobody has asked that what it takes the place of be taken back: where that moves it is taken over with its undo, when both are done.
-    if let Some(group) = configuration.group
-        && moves_beside(&planned, &frame)
-        && let Some((alone, own)) = push(&Configuration { group: None, ..configuration.clone() })
-    {
-        (planned, frame) = (alone, Frame { group: Some(group), ..own });
-    }
+    let Some(frame) = planned.parts[0].edits.push.as_deref().cloned() else {
+        return piecewise(system, configuration, request, at, context);
+    };
     if !planned.of.is_empty() {
         let steps: &mut Vec<PlannedStep> = Arc::make_mut(&mut planned.steps);
         net::components_side_by_side(steps);
     }
     BestEffort { planned, frame: Frame { left: request.gone, ..frame }, troubles: Vec::new() }
-}
-
-/// Whether something moves that is none of a frame's own steps.
-fn moves_beside(planned: &Planned, frame: &Frame) -> bool {
-    let own = |step: &Step| frame.steps().iter().any(|own| own.step == *step);
-    planned.steps.iter().any(|planned| planned.moves && !own(&planned.step))
 }
 
 /// A configuration without what is about components that are not there.

@@ -16,8 +16,6 @@ types:
     operations:
       brake:   { effect: { undo: release } }
       release: { effect: { undo: brake } }
-      open:    { effect: { undo: close }, moves: true }
-      close:   { effect: { undo: open }, moves: true }
 configurations: [conf.lua]
 coordinator: a.yaml
 deploy: { event: e_start, up: up, within_s: 5 }
@@ -45,8 +43,6 @@ const CONFIGURATIONS: &str = r#"return ConfiguratorConf {
   still = Configuration { safe=true, group="pm", property_set("l.limit",0.01), property_set("r.limit",0.02) },
   freeze = Configuration { safe=true, group="ice", property_set("l.limit",0.0), property_set("l.k",0.0) },
   stop = Configuration { safe=true, port_write("r.speed",0.0), operation_call("r.brake") },
-  opened = Configuration { group="g", property_set("r.k",7.0), operation_call("r.open") },
-  shut = Configuration { safe=true, group="g", property_set("r.k",0.0), operation_call("r.brake") },
   join = Configuration { connect("l.pos","r.w") },
   tune = Configuration { property_set("r.k",2.0) },
   half = Configuration { on_failure="hold", property_set("l.k",3.0), operation_call("l.brake") },
@@ -101,21 +97,6 @@ fn what_it_said_to_be_done_is_not_forgotten_with_what_it_has_interrupted() {
          undo('freeze') wait(1) say('k ' .. property('l.k'))",
     );
     assert_eq!(told, ["k 0.0 0", "k 1.0"]);
-}
-
-/// What it takes the place of would be taken back by what moves: that is not done before somebody lets go of it.
-#[test]
-fn what_it_takes_the_place_of_is_not_moved_back() {
-    let told = said(
-        "apply('opened', {force = true}) wait(1) apply('shut') wait_answer('shut.ok', 1)
-         local function tell()
-             for _, entry in ipairs(log{ since = 0 }) do for _, step in ipairs(entry.steps or {}) do
-                 local moves = tostring(step.step):match('r.close') if moves then say(entry.answer .. ' ' .. moves) end
-             end end
-         end
-         tell() say('held') undo('shut', {force = true}) wait_answer('shut.undone', 1) tell() say('k ' .. property('r.k') .. ' ' .. #stack())",
-    );
-    assert_eq!(told, ["held", "shut.undone r.close", "k 1.0 1"]);
 }
 
 /// `half` breaks while a connection to `r` is there that was said to be gone, and `r` is being set: that is no part of what differs.

@@ -30,3 +30,12 @@ fn whose_arm_came_down_is_told_and_the_other_one_is_not() {
         run("fell.lua", &[("who", who)], 3);
     }
 }
+
+/// Its driver lives; it has jammed on the way up, and can be taken down by force alone once it has been folded by hand.
+#[test]
+fn an_arm_that_could_not_unfold_is_held_when_its_drives_are_to_go_off() {
+    let end = script(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/youbot/jammed.lua"), &[]);
+    assert_eq!(end.figures.len(), 5);
+    let ended = end.ended.expect("it deployed something");
+    assert!(ended.is_clean() && !ended.is_orderly(), "{ended:?}");
+}

@@ -8,10 +8,9 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Each with what is set for it here: what takes a minute in the file is shorter.
-const SCENARIOS: [(&str, &[(&str, &str)]); 34] = [
+const SCENARIOS: [(&str, &[(&str, &str)]); 33] = [
     ("beside", &[]),
     ("blocked", &[]),
-    ("jammed", &[]),
     ("bring_up", &[]),
     ("clocks", &[]),
     ("configurator", &[]),
@@ -110,11 +109,6 @@ fn beside() {
 #[test]
 fn blocked() {
     run("blocked");
-}
-
-#[test]
-fn jammed() {
-    run("jammed");
 }
 
 #[test]

@@ -1,4 +1,4 @@
--- A joint jams while an arm unfolds, and neither way is open:  davit run examples/scenarios/jammed.lua --clock simulated
+-- A joint jams while an arm unfolds, and neither way is open:  davit run tests/youbot/jammed.lua --clock simulated
 --
 -- The bring-up fails, and the arm is held where it is: what has failed leaves nothing to be undone, so the way down does not fold it. When the
 -- drives are to go off it would sink; they hold it, and wait for somebody to look. Free again it is folded by hand, and the rest taken down.
