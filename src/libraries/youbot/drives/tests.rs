@@ -214,6 +214,7 @@ fn braking_brings_a_moving_arm_and_its_base_to_rest() {
     drives.brake();
     assert_eq!(drives.mode(), DriveMode::Positioning);
     let mut resting = parked();
+    resting.update(None, None, &Vector3::zeros(), 0.001, &mut |_| ());
     resting.brake();
     assert_eq!(resting.mode(), DriveMode::MotorStop);
 }
