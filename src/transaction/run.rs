@@ -7,7 +7,6 @@ use crate::limits;
 use crate::model::{Cause, ComponentName, Execution, Finding, Outcome, RunState, Step};
 use crate::plan::PlannedStep;
 use crate::stack::Reason;
-use crate::system::touch::components;
 use crate::system::{System, Undo, View as _, Violation, is_so, step};
 use crate::time::Time;
 use rustc_hash::FxHashSet;
