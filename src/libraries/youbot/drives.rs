@@ -282,10 +282,10 @@ impl Drives {
     }
 
     /// Whatever is under way ends, as with [`hold`](Self::hold), of what moves or takes torques, and of an arm that sinks since its drives went
-    /// off. Drives that are off stay off where the arm rests. Those that hold already, or come to rest, go on with that: held anew each time, the
+    /// off. Drives that are off stay off where the arm rests, and as long as nobody knows where it is. Those that hold already, or come to rest, go on with that: held anew each time, the
     /// arm would give way under a load.
     pub fn stop(&mut self) {
-        let sinks = self.mode == DriveMode::MotorStop && !self.is_carried();
+        let sinks = self.mode == DriveMode::MotorStop && self.calibrated && !self.is_carried();
         if self.busy() || self.mode == DriveMode::Torque || sinks {
             self.hold();
         }
