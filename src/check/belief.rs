@@ -15,8 +15,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 use std::sync::Arc;
 
-/// So many events of a parent lie in a subsystem's inbox at once; it takes the first of them before one more comes.
-const MOST_UNTAKEN: usize = 3;
+/// So many events of a parent lie in a subsystem's inbox at once, at most; it takes the first of them before one more comes.
+pub const MOST_UNTAKEN: usize = 3;
+
+/// So often one event comes before it tells something, where less is known of its inbox; what comes once more changes nothing.
+const MOST_REPEATED: u8 = 1;
 
 /// A state that it may be in, and what it has not taken yet: places among the events that it takes, from 1 on.
 type Possible = (u32, [u8; MOST_UNTAKEN]);
@@ -25,6 +28,9 @@ type Possible = (u32, [u8; MOST_UNTAKEN]);
 /// nothing more is told.
 pub type MayTell = Rc<[(EventName, Failed, u32)]>;
 
+/// What was raised last, since it has told something, and how often: where that is known.
+type Repeated = Option<(u8, u8)>;
+
 /// What may be.
 type Belief = Rc<[Possible]>;
 
@@ -32,30 +38,39 @@ type Belief = Rc<[Possible]>;
 #[derive(Debug, Clone)]
 pub struct Beliefs {
     automaton: Arc<InterfaceAutomaton>,
+    /// So many events lie in its inbox at once.
+    most_untaken: usize,
     /// What its parent waits for; what else it tells is nothing to see.
     heard: BTreeSet<EventName>,
     takes: Vec<(EventName, Precedence)>,
     /// What others raise for it of whom nothing is known here: that comes at any time.
     others: BTreeSet<EventName>,
-    sets: IndexSet<Belief, FxBuildHasher>,
+    sets: IndexSet<(Belief, Repeated), FxBuildHasher>,
     tells: FxHashMap<u32, MayTell>,
     raised: FxHashMap<(u32, u8), (u32, bool)>,
 }
 
 impl Beliefs {
     /// Nothing was raised yet. `takes`: what those who are followed may raise, and what of that goes first; `others`: what coordinators of
-    /// the parent may raise who are not; by the names of the subsystem's own file, like `heard`.
+    /// the parent may raise who are not; by the names of the subsystem's own file, like `heard`. `most_untaken`: so many events lie in its inbox at
+    /// once, as far as it can take them; of fewer than [`MOST_UNTAKEN`] what is raised again before it tells something changes nothing.
     pub fn new(
         automaton: Arc<InterfaceAutomaton>,
+        most_untaken: usize,
         takes: Vec<(EventName, Precedence)>,
         others: BTreeSet<EventName>,
         heard: BTreeSet<EventName>,
     ) -> Self {
         let start = automaton.start();
         let (sets, tells, raised) = (IndexSet::default(), FxHashMap::default(), FxHashMap::default());
-        let mut beliefs = Self { automaton, heard, takes, others, sets, tells, raised };
-        beliefs.of([(start, [0; MOST_UNTAKEN])]);
+        let mut beliefs = Self { automaton, most_untaken, heard, takes, others, sets, tells, raised };
+        beliefs.of([(start, [0; MOST_UNTAKEN])], None);
         beliefs
+    }
+
+    /// So many events lie in its inbox at once.
+    pub fn most_untaken(&self) -> usize {
+        self.most_untaken
     }
 
     /// What it may tell now.
@@ -64,7 +79,7 @@ impl Beliefs {
             return known.clone();
         }
         let mut after: BTreeMap<(EventName, Failed), Vec<Possible>> = BTreeMap::new();
-        for (state, untaken) in self.sets[belief as usize].iter() {
+        for (state, untaken) in self.sets[belief as usize].0.iter() {
             for (by, to) in self.automaton.leads(*state) {
                 if let InterfaceAction::Tells(event, failed) = by
                     && self.heard.contains(event)
@@ -75,7 +90,7 @@ impl Beliefs {
             }
         }
         let tells: MayTell =
-            after.into_iter().map(|((event, failed), those)| (event, failed, self.of(those))).collect();
+            after.into_iter().map(|((event, failed), those)| (event, failed, self.of(those, None))).collect();
         self.tells.insert(belief, tells.clone());
         tells
     }
@@ -87,12 +102,23 @@ impl Beliefs {
         if let Some(known) = self.raised.get(&(belief, number)) {
             return *known;
         }
-        let before = self.sets[belief as usize].clone();
-        let after = before.iter().filter_map(|(state, untaken)| {
-            let mut untaken = *untaken;
-            *untaken.iter_mut().find(|place| **place == 0)? = number;
-            Some((*state, untaken))
-        });
+        let (before, repeated) = self.sets[belief as usize].clone();
+        let times = repeated.filter(|(last, _)| *last == number).map_or(0, |(_, times)| times);
+        let repeated = (self.most_untaken < MOST_UNTAKEN).then_some((number, times + 1));
+        if repeated.is_some() && times >= MOST_REPEATED {
+            return (belief, false);
+        }
+        let with = |most: usize| -> Vec<Possible> {
+            let of = |(state, untaken): &Possible| {
+                let mut untaken = *untaken;
+                *untaken[..most].iter_mut().find(|place| **place == 0)? = number;
+                Some((*state, untaken))
+            };
+            before.iter().filter_map(of).collect()
+        };
+        // Where it can take none of them before, more of them lie there.
+        let after = (self.most_untaken..=MOST_UNTAKEN).map(with).find(|after| !after.is_empty());
+        let after = after.unwrap_or_else(|| before.to_vec());
         // Where something has failed nobody can tell.
         let heeds = |(state, untaken): &Possible| {
             let mut takes = self.automaton.leads(*state).iter();
@@ -101,13 +127,13 @@ impl Beliefs {
         let well: Vec<&Possible> = before.iter().filter(|(state, _)| !self.automaton.state(*state).failed).collect();
         let down = |(state, _): &Possible| self.automaton.state(*state).down;
         let lost = !well.is_empty() && !well.into_iter().any(|possible| heeds(possible) || down(possible));
-        let known = (self.of(after.collect::<Vec<_>>()), lost);
+        let known = (self.of(after, repeated), lost);
         self.raised.insert((belief, number), known);
         known
     }
 
     /// What is known where it is in one of these, or silently got on from there.
-    fn of(&mut self, some: impl IntoIterator<Item = Possible>) -> u32 {
+    fn of(&mut self, some: impl IntoIterator<Item = Possible>, repeated: Repeated) -> u32 {
         let mut met: FxHashSet<Possible> = FxHashSet::default();
         let mut open: Vec<Possible> = some.into_iter().collect();
         while let Some((state, untaken)) = open.pop() {
@@ -132,7 +158,7 @@ impl Beliefs {
         let mut set: Vec<Possible> = met.into_iter().collect();
         set.sort_unstable();
         let set: Belief = set.into();
-        u32::try_from(self.sets.insert_full(set).0).unwrap_or(u32::MAX)
+        u32::try_from(self.sets.insert_full((set, repeated)).0).unwrap_or(u32::MAX)
     }
 
     /// What it may take next of what it has not taken, each with what is left then: of some of it the rest may not have come yet.
@@ -194,7 +220,7 @@ mod tests {
         (states[0].down, states[5].failed) = (true, true);
         let takes = vec![(name("e_start"), Precedence::UrgentAsLast), (name("e_shutdown"), Precedence::UrgentAsLast)];
         let heard = ["up", "down", "failed"].map(name).into();
-        Beliefs::new(Arc::new(AutomatonDraft::whole(edges, states, 0)), takes, others, heard)
+        Beliefs::new(Arc::new(AutomatonDraft::whole(edges, states, 0)), MOST_UNTAKEN, takes, others, heard)
     }
 
     fn told(beliefs: &mut Beliefs, belief: u32) -> Vec<(String, Failed)> {

@@ -68,11 +68,18 @@ pub enum Bound {
     Entered,
     /// Whether what a configuration stands for becomes true where others change what it looks at.
     Stands,
-    /// [`limits::CHECK_PLACES`], [`limits::CHECK_BELIEVED`]: in which order subsystems tell things.
+    /// [`limits::CHECK_PLACES`]: in which order subsystems tell things.
     Told,
+    /// [`limits::CHECK_BELIEVED`]: the same.
+    Forgotten,
+    /// [`limits::CHECK_BELIEVED`]: that several events lie untaken in a subsystem's inbox, or one comes twice.
+    Untaken,
     /// [`limits::CHECK_DRIVEN`]: how long a way up or down lasts.
     Times,
 }
+
+/// What is not followed where nothing is known of what subsystems tell when.
+const TOLD: &str = "in which order subsystems tell things, and that these do not wait to be heard, was not followed";
 
 impl Bound {
     /// Where one of these cut something off, there is no telling what.
@@ -171,9 +178,15 @@ impl Bound {
                  failed, nor what comes while it is being applied"
                     .to_owned()
             }
-            Self::Told => {
-                "in which order subsystems tell things, and that these do not wait to be heard, was not followed".to_owned()
+            Self::Told => TOLD.to_owned(),
+            Self::Forgotten => {
+                format!("{TOLD}, for with that there are more than {} transitions (`--budget`)", effort.believed())
             }
+            Self::Untaken => format!(
+                "that subsystems take an event after the next one has come, or one twice before they tell something, was not followed, for \
+                 with that there are more than {} transitions (`--budget`)",
+                effort.believed()
+            ),
             Self::Entered => "a coordinator could not be entered".to_owned(),
             Self::Times => {
                 "whether one comes up, or down, in time was not followed to the end: a time may add up to too much, and there are too many \

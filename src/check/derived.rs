@@ -12,7 +12,6 @@ use super::product::Product;
 use super::reactions::triggers;
 use super::shared_list::SharedList;
 use super::state::{Failed, Move, ProductState};
-use crate::limits;
 use crate::model::subsystem::{IGNORED, SeenStanding, standing};
 use crate::model::{Deployment, EventName, SubsystemStanding};
 use crate::statechart::EventId;
@@ -69,7 +68,7 @@ impl Graph<'_, '_> {
         let mut next = 0;
         while let Some((place, number)) = deriving.places.get_index(next).map(|(place, number)| (*place, *number)) {
             next += 1;
-            if deriving.places.len() > limits::CHECK_PLACES {
+            if deriving.places.len() > self.product.effort.places() {
                 return None;
             }
             deriving.standings(place, number);

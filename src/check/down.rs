@@ -203,7 +203,10 @@ impl Graph<'_, '_> {
             if !(self.product.never_down && matches!(barred, Barred::Closed | Barred::Late)) {
                 let tell = |graph: &mut Self, at| match graph.loses_the_end(at).filter(|_| barred == Barred::Again) {
                     Some(finding) => finding,
-                    None => graph.barred(at, barred, &bars, &before),
+                    None => {
+                        let missed = graph.missed(at).filter(|_| barred == Barred::Again);
+                        missed.into_iter().fold(graph.barred(at, barred, &bars, &before), Finding::help)
+                    }
                 };
                 found_at(self, some, barred != Barred::Reported, &tell);
             }
@@ -321,6 +324,22 @@ impl Graph<'_, '_> {
                 "let `{event}` lead down from `{lost}` as well; else what is left is taken down without the coordinator"
             ));
         Some(finding)
+    }
+
+    /// What to do about what a subsystem has told on the way, where no transition waited for it.
+    fn missed(&mut self, at: u32) -> Option<String> {
+        let way = self.edges_to(at);
+        let told = |number: &u32| {
+            let Move::Unheard(place) = self.by(&self.edges[*number as usize]) else { return None };
+            let name = self.product.outside[usize::from(place)];
+            self.product.is_known(name).then_some((*number, name))
+        };
+        let (number, name) = way.iter().rev().find_map(told)?;
+        let place = self.product.place(&self.states[self.edges[number as usize].from as usize]);
+        Some(format!(
+            "`{name}` comes in `{place}`, where no transition waits for it, and is told once: hear it there as well; else what is left is taken \
+             down without the coordinator"
+        ))
     }
 
     /// All are in *down*, and a subsystem is not: nobody is there to lead it down.

@@ -45,6 +45,20 @@ pub struct Effort<'e> {
     pub goes_on: &'e (dyn Fn(Far) -> Result<(), Halt> + Sync),
 }
 
+impl Effort<'_> {
+    /// So many transitions at most while all is known of the order in which subsystems tell things: three of eight, and
+    /// [`limits::CHECK_BELIEVED`] at least.
+    pub(super) fn believed(&self) -> usize {
+        (self.transitions / 8).saturating_mul(3).max(limits::CHECK_BELIEVED).min(self.transitions)
+    }
+
+    /// So many states of a subsystem, as often as they differ for its parent, of which an interface automaton is made: as many as an eighth of the
+    /// transitions, and [`limits::CHECK_PLACES`] at least.
+    pub(super) fn places(&self) -> usize {
+        (self.transitions / 8).max(limits::CHECK_PLACES)
+    }
+}
+
 impl Default for Effort<'_> {
     /// [`limits::CHECK_TRANSITIONS`], any number of states, and to the end.
     fn default() -> Self {
@@ -74,6 +88,16 @@ impl Left<'_> {
     /// The same, with so many transitions at most.
     pub fn at_most(&self, transitions: usize) -> Self {
         Effort { transitions: transitions.min(self.effort.transitions), ..self.effort }.into()
+    }
+
+    /// [`Effort::believed`].
+    pub fn believed(&self) -> usize {
+        self.effort.believed()
+    }
+
+    /// [`Effort::places`].
+    pub fn places(&self) -> usize {
+        self.effort.places()
     }
 
     /// So many transitions at most.

@@ -1,16 +1,16 @@
 //! What is known of the subsystems of the deployment that is followed.
 
 use super::belief::Beliefs;
+use super::bound::Bound;
 use super::effort::Left;
 use super::neighbours::{Neighbours, accepted};
 use super::product::Product;
-use crate::limits;
 use crate::model::EventName;
 use std::collections::BTreeSet;
 
 impl<'a> Product<'a> {
-    /// This is around the deployment.
-    pub(super) fn stands_in(&mut self, around: &Neighbours) {
+    /// This is around the deployment; of each subsystem is known what it may tell where so many events lie untaken in its inbox.
+    pub(super) fn stands_in(&mut self, around: &Neighbours, most_untaken: usize) {
         self.parent = around.parent.clone();
         for child in &mut self.children {
             let local = |event: &EventName| EventName::new(event.local(child.path)?).ok();
@@ -24,7 +24,7 @@ impl<'a> Product<'a> {
             let others = accepted(of).into_iter().filter(raised_by_some).filter_map(|event| local(&event));
             let others = others.filter(|event| !raised.contains(event)).collect();
             let takes = raised.into_iter().map(|event| (event, of.own.precedence(event))).collect();
-            child.beliefs = Some(Beliefs::new(automaton.clone(), takes, others, heard));
+            child.beliefs = Some(Beliefs::new(automaton.clone(), most_untaken, takes, others, heard));
         }
     }
 
@@ -38,15 +38,22 @@ impl<'a> Product<'a> {
         self.children.iter().any(|child| child.beliefs.is_none())
     }
 
-    /// From now on they may tell anything in any order.
-    pub(super) fn forget_children(&mut self) {
+    /// Less is known of them from now on: that each takes an event before the next one comes; then nothing, so that they may tell anything in any
+    /// order. Answers what is left out by that.
+    pub(super) fn know_less(&mut self, around: &Neighbours) -> Bound {
+        let most = self.children.iter().filter_map(|child| child.beliefs.as_ref().map(Beliefs::most_untaken)).max();
+        if most > Some(1) {
+            self.stands_in(around, 1);
+            return Bound::Untaken;
+        }
         self.children.iter_mut().for_each(|child| child.beliefs = None);
+        Bound::Forgotten
     }
 
     /// How much is followed while what is known of subsystems makes more of it.
     pub(super) fn most_believed(&self) -> Left<'a> {
         match self.knows_children() {
-            true => self.effort.at_most(limits::CHECK_BELIEVED),
+            true => self.effort.at_most(self.effort.believed()),
             false => self.effort.at_most(usize::MAX),
         }
     }

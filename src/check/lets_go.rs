@@ -1,13 +1,13 @@
-//! That a safe configuration lets go of what another one of its group has made safe.
+//! What a safe configuration takes back of another one of its group: what that has made safe, and what moves when it is taken back.
 //!
 //! Alternatives replace one another: the frame that was in force is undone, and what it had called is taken back, before the
 //! next one acts. What both call is not taken back in between (`stack/share.rs`); what only the first one calls is, and so is what
 //! only the first one sets, or brings to a run state.
 
 use super::universe::Universe;
-use crate::model::codes::CONF_SAFE_LETS_GO;
+use crate::model::codes::{CONF_SAFE_LETS_GO, CONF_SAFE_MOVES};
 use crate::model::{
-    Call, ChangeKind, Configuration, Deployment, Finding, Findings, MemberRef, Origin, StateEntry, Target,
+    Call, ChangeKind, Configuration, Deployment, Finding, Findings, MemberRef, Origin, StateEntry, Target, Wanted,
 };
 
 /// What is taken back when a configuration's frame is undone.
@@ -21,17 +21,18 @@ struct Kept {
     keep: String,
 }
 
-/// Of every two safe alternatives: what the first one has called and the second one lets go of.
+/// Of every two alternatives of which the second one is safe: what the first one has made safe and the second one lets go of, or, where it is not
+/// safe, what of it moves when it is taken back.
 pub fn check(deployment: &Deployment, universe: &Universe) -> Findings {
-    let safe = || deployment.configurations.iter().filter(|c| c.safe && c.group.is_some());
-    let pairs = safe().flat_map(|first| {
-        safe()
-            .filter(move |second| second.group == first.group && second.id != first.id)
-            .map(move |second| (first, second))
+    let grouped = || deployment.configurations.iter().filter(|c| c.group.is_some());
+    let pairs = grouped().flat_map(|first| {
+        let others =
+            grouped().filter(move |second| second.safe && second.group == first.group && second.id != first.id);
+        others.map(move |second| (first, second))
     });
-    let found = pairs.filter_map(|(first, second)| {
-        let kept = let_go_of(first, second, universe);
-        Some(finding(first, second, &kept?))
+    let found = pairs.filter_map(|(first, second)| match first.safe {
+        true => Some(finding(first, second, &let_go_of(first, second, universe)?)),
+        false => Some(moving(first, second, &moves_back(first, second, universe)?)),
     });
     found.collect()
 }
@@ -43,18 +44,56 @@ fn calls(configuration: &Configuration) -> impl Iterator<Item = (&Call, Option<&
     })
 }
 
+/// What the first one calls and the second one does not, by what it is taken back, and where.
+fn taken_back<'c>(
+    first: &'c Configuration,
+    second: &'c Configuration,
+    universe: &'c Universe,
+) -> impl Iterator<Item = (MemberRef, MemberRef, Origin)> + 'c {
+    let calls_too = |operation| calls(second).any(|(call, ..)| call.operation == operation);
+    calls(first).filter(move |(call, ..)| !calls_too(call.operation)).filter_map(|(call, undo, at)| {
+        let by = undo.map(|undo| undo.operation).or_else(|| universe.undone_by(call.operation).next())?;
+        Some((call.operation, by, at))
+    })
+}
+
+/// What moves when the first one, which is not safe, is taken back.
+fn moves_back(first: &Configuration, second: &Configuration, universe: &Universe) -> Option<Kept> {
+    let called = taken_back(first, second, universe).find(|(_, by, _)| universe.moves(*by));
+    let called = called.map(|(operation, by, at)| Kept {
+        at,
+        does: "calls it".to_owned(),
+        back: format!("`{by}` moves, and takes `{operation}` back"),
+        keep: format!("call `{operation}` too: it then stays"),
+    });
+    let before = |entry: StateEntry| first.pre.iter().find(|other| other.target == entry.target);
+    let brought = || {
+        first.post.iter().find_map(|entry| {
+            let Target::Component(component) = entry.target else { return None };
+            // What it finds so and leaves so is not taken back.
+            let stays = before(entry).is_some_and(|before| before.state == entry.state);
+            let theirs = second.pre.iter().chain(second.post.iter()).any(|other| other.target == entry.target);
+            let moves = universe.of(component).iter().filter_map(|creation| creation.description.as_ref()).any(|ty| {
+                entry.state == Wanted::Running && ty.moves.stop || entry.state == Wanted::Stopped && ty.moves.start
+            });
+            (!stays && !theirs && moves).then(|| Kept {
+                at: entry.origin,
+                does: "brings it to a run state".to_owned(),
+                back: format!("`{component}` moves when its run state is taken back"),
+                keep: format!("bring `{component}` to a run state too"),
+            })
+        })
+    };
+    called.or_else(brought)
+}
+
 /// What the first one has made safe, and the second one does nothing about.
 fn let_go_of(first: &Configuration, second: &Configuration, universe: &Universe) -> Option<Kept> {
-    let calls_too = |operation| calls(second).any(|(call, ..)| call.operation == operation);
-    let called = calls(first).filter(|(call, ..)| !calls_too(call.operation)).find_map(|(call, undo, at)| {
-        let by = undo.map(|undo| undo.operation).or_else(|| universe.undone_by(call.operation).next())?;
-        let operation = call.operation;
-        Some(Kept {
-            at,
-            does: "calls it".to_owned(),
-            back: format!("`{by}` takes `{operation}` back"),
-            keep: format!("call `{operation}` too: it then stays"),
-        })
+    let called = taken_back(first, second, universe).next().map(|(operation, by, at)| Kept {
+        at,
+        does: "calls it".to_owned(),
+        back: format!("`{by}` takes `{operation}` back"),
+        keep: format!("call `{operation}` too: it then stays"),
     });
     let sets_too = |property| sets(second).any(|(other, _)| other == property);
     let set = || {
@@ -96,4 +135,19 @@ fn finding(first: &Configuration, second: &Configuration, kept: &Kept) -> Findin
         .also(kept.at, format!("`{}` {} here", first.id, kept.does))
         .path(format!("configurations.{}.group", second.id))
         .help(format!("let `{}` {}; or give them no group in common", second.id, kept.keep))
+}
+
+fn moving(first: &Configuration, second: &Configuration, kept: &Kept) -> Finding {
+    let message = format!(
+        "`{}` is safe, and replaces `{}`, something of which moves when it is taken back: {}",
+        second.id, first.id, kept.back
+    );
+    Finding::warning(CONF_SAFE_MOVES, message)
+        .at(second.origin)
+        .also(kept.at, format!("`{}` {} here", first.id, kept.does))
+        .path(format!("configurations.{}.group", second.id))
+        .help(format!(
+            "give `{}` no group: it is then in force over `{}`, and nothing of that is taken back before somebody asks for it; or let it {}",
+            second.id, first.id, kept.keep
+        ))
 }

@@ -1,6 +1,7 @@
 //! The whole check, one family after the other; and single families, for who changes a running deployment.
 
 use super::automaton::InterfaceAutomaton;
+use super::belief::MOST_UNTAKEN;
 use super::bound::Bound;
 use super::deeper::Deeper;
 use super::driven::DrivenPorts;
@@ -172,12 +173,12 @@ fn follow(
     product.follow_with(effort);
     // Of several coordinators there are too many ways with all that is known of the order in which subsystems tell things.
     if all.len() == 1 {
-        product.stands_in(around);
+        product.stands_in(around, MOST_UNTAKEN);
     }
     let groups = if effort.together { vec![all.clone()] } else { coupling::groups(deployment, catalogue, charts) };
     product.groups.clone_from(&groups);
     let mut found = ways::ways(&mut product);
-    product.stands_in(around);
+    product.stands_in(around, MOST_UNTAKEN);
     if product.effort.halted().is_some() {
         // Where it ended says nothing of the ways.
         found.clear();
@@ -204,10 +205,11 @@ fn follow(
         if let Some(apart) = &mut apart {
             apart.never_down = product.never_down;
             apart.follow_with(effort);
-            apart.stands_in(around);
+            apart.stands_in(around, MOST_UNTAKEN);
         }
         let product = apart.as_mut().unwrap_or(&mut product);
         let mut deeper = Deeper::new(product);
+        let mut known_less = None;
         loop {
             product.follow_anew();
             product.effort = product.most_believed();
@@ -217,7 +219,7 @@ fn follow(
             }
             if graph.product.knows_children() && graph.is_used_up() {
                 // With all that is known of them there is too much of it.
-                graph.product.forget_children();
+                known_less = Some(graph.product.know_less(around));
                 graph.product.follow_with(effort);
                 continue;
             }
@@ -230,7 +232,10 @@ fn follow(
             if graph.product.elsewhere.is_some() {
                 graph.cut(Bound::Elsewhere, Failed::Nothing);
             }
-            if graph.product.knows_no_order() {
+            if let Some(less) = known_less {
+                graph.cut(less, Failed::Nothing);
+            }
+            if graph.product.knows_no_order() && known_less != Some(Bound::Forgotten) {
                 graph.cut(Bound::Told, Failed::Nothing);
             }
             if graph.product.waits_for_others() {

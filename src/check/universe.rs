@@ -118,6 +118,12 @@ impl Universe {
         picture
     }
 
+    /// Whether an operation moves hardware, as one of the types says.
+    pub fn moves(&self, operation: MemberRef) -> bool {
+        let types = self.of(operation.component).iter().filter_map(|creation| creation.description.as_ref());
+        types.filter_map(|ty| ty.operations.get(&operation.member)).any(|of| of.moves)
+    }
+
     /// The operations that undo another one, as the types say.
     pub fn undone_by(&self, operation: MemberRef) -> impl Iterator<Item = MemberRef> + '_ {
         let types = self.of(operation.component).iter().filter_map(|creation| creation.description.as_ref());

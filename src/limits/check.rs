@@ -4,12 +4,13 @@
 /// `--budget` says otherwise. About a second of work; one robot of the youBot coupling beside another one needs 487,000.
 pub const CHECK_TRANSITIONS: usize = 800_000;
 
-/// Events and answers that are followed of a parent with all that is known of the order in which its subsystems tell things. Where there are
-/// more it is followed with subsystems that may tell anything in any order: that has fewer states, and may refuse too much.
+/// Events and answers that are followed of a parent with all that is known of the order in which its subsystems tell things, or three of eight of
+/// `--budget`. Where there are more it is followed with subsystems that take an event before the next one comes, and where that is too much, with
+/// subsystems that may tell anything in any order: that has fewer states, and may refuse too much.
 pub const CHECK_BELIEVED: usize = 300_000;
 
 /// States of a subsystem, each as often as it differs in what its parent was told and in what has failed, up to which an interface automaton is
-/// made of them. One with more may tell anything in any order.
+/// made of them, or an eighth of `--budget`. One with more may tell anything in any order.
 pub const CHECK_PLACES: usize = 100_000;
 
 /// The largest number of transitions that `--budget` takes, and of states.

@@ -504,6 +504,43 @@ fn a_safe_configuration_does_not_let_go_of_what_another_one_has_made_safe() {
     assert!(brought.len() == 1 && brought[0].contains("the run state of `a` is taken back"), "{brought:?}");
 }
 
+/// Something safe takes the place of something that is not: what moves when that is taken back would move in an emergency.
+#[test]
+fn what_moves_when_something_safe_takes_its_place_is_warned_of() {
+    let of = |open: &str, shut: &str| {
+        let configurations = format!(
+            "base = Configuration {{ create(\"a\", \"Valve\") }},
+             open = Configuration {{ {open} }},
+             shut = Configuration {{ safe = true, {shut} property_set(\"a.gain\", 0.0) }},"
+        );
+        let small = Small::new(&configurations, STATES, "");
+        small.demo.replace(
+            "small.yaml",
+            "types:\n",
+            "types:
+  Valve:
+    moves: [stop]
+    properties: { gain: { type: float, default: 1.0 } }
+    operations: { turn: { effect: { undo: back } }, back: { moves: true, effect: { undo: turn } } }
+",
+        );
+        let said = small.check();
+        let found = said.of("conf::safe_moves");
+        assert!(found.iter().all(|finding| finding["severity"] == "warning"), "{:#}", said.0);
+        found.iter().map(|finding| finding["message"].as_str().unwrap().to_owned()).collect::<Vec<_>>()
+    };
+    let turned = "group = \"g\", operation_call(\"a.turn\"),";
+    let told = of(turned, "group = \"g\",");
+    let whole = "`shut` is safe, and replaces `open`, something of which moves when it is taken back: `a.back` moves, and takes `a.turn` back";
+    assert_eq!(told, [whole]);
+    // It calls it too; they are no alternatives; what takes it back does not move.
+    assert_eq!(of(turned, "group = \"g\", operation_call(\"a.turn\"),"), [""; 0]);
+    assert_eq!(of(turned, ""), [""; 0]);
+    assert_eq!(of("group = \"g\", property_set(\"a.gain\", 2.0),", "group = \"g\","), [""; 0]);
+    let runs = of("group = \"g\", post_conf_state = { \"a:running\" },", "group = \"g\",");
+    assert!(runs.len() == 1 && runs[0].ends_with("`a` moves when its run state is taken back"), "{runs:?}");
+}
+
 /// What others may change meanwhile is not judged, and that is said.
 #[test]
 fn what_a_configuration_stands_for_and_others_change_is_not_called_followed() {

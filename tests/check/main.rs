@@ -32,5 +32,6 @@ mod shown;
 mod stopping;
 mod support;
 mod sure;
+mod told_once;
 mod undriven;
 mod verdicts;

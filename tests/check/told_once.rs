@@ -1,0 +1,119 @@
+//! What a subsystem tells is told once, whether somebody waits for it or not: also where all that it may tell makes too much of its parent.
+
+use super::composed::{catalogue, load};
+use davit::check::{self, CheckVerdict, Effort, Report};
+use davit::lang::Sources;
+
+const POD: &str = "
+davit: 1
+name: pod
+platform: simulated
+types: { Esc: {} }
+configurations: [pod_conf.yaml]
+coordinator: pod_coord.yaml
+deploy: { event: e_on, up: on, failed: [failed], within_s: 3 }
+shutdown: { event: e_off, down: off, within_s: 3 }
+";
+
+const POD_CONF: &str = "
+configurations:
+  make: { changes: [{ create: { component: esc, type: Esc } }] }
+";
+
+const POD_COORDINATOR: &str = "
+coordinator:
+  states:
+    off: {}
+    alive:
+      states: { making: { entry: make }, on: {}, failed: {}, removing: { entry: make.undo } }
+      transitions:
+        - { src: initial, tgt: making }
+        - { src: making, tgt: on, events: [make.ok] }
+        - { src: making, tgt: failed, events: [make.failed, make.broken] }
+        - { src: removing, tgt: failed, events: [make.undo.failed, make.undo.broken] }
+  transitions:
+    - { src: initial, tgt: off }
+    - { src: off, tgt: alive, events: [e_on] }
+    - { src: alive, tgt: .alive.removing, events: [e_off] }
+    - { src: alive, tgt: off, events: [make.undone] }
+";
+
+const TWO: &str = "
+davit: 1
+name: two
+platform: simulated
+types: { Lamp: {} }
+subsystems: { port: { deployment: pod.yaml }, star: { deployment: pod.yaml } }
+configurations: [two_conf.yaml]
+coordinator: two_coord.yaml
+deploy: { event: e_start, up: ready, within_s: 5 }
+shutdown: { event: e_end, down: off, within_s: 5 }
+";
+
+/// It waits for one to be down, and then for the other; the way down begins in a state around all.
+const TWO_COORDINATOR: &str = "
+coordinator:
+  states:
+    off: {}
+    alive:
+      states:
+        one: { entry: [port/e_on, star/e_on] }
+        two: {}
+        ready: {}
+        three: { entry: [port/e_off, star/e_off] }
+        four: {}
+      transitions:
+        - { src: initial, tgt: one }
+        - { src: one, tgt: two, events: [port/up] }
+        - { src: two, tgt: ready, events: [star/up] }
+        - { src: three, tgt: four, events: [port/down, port/e_off.ignored] }
+  transitions:
+    - { src: initial, tgt: off }
+    - { src: off, tgt: alive, events: [e_start] }
+    - { src: alive, tgt: .alive.three, events: [e_end] }
+    - { src: .alive.four, tgt: off, events: [star/down, star/e_off.ignored] }
+";
+
+fn checked(coordinator: String, transitions: usize) -> Report {
+    let files = [
+        ("pod.yaml", POD.to_owned()),
+        ("pod_conf.yaml", POD_CONF.to_owned()),
+        ("pod_coord.yaml", POD_COORDINATOR.to_owned()),
+        ("two.yaml", TWO.to_owned()),
+        ("two_conf.yaml", "configurations: {}\n".to_owned()),
+        ("two_coord.yaml", coordinator),
+    ];
+    let deployment = load(&Sources::memory(files), "two.yaml", &[]).deployment.expect("it can be read");
+    let catalogue = catalogue(&deployment);
+    check::run_with(deployment, &catalogue, Effort { transitions, ..Effort::default() })
+}
+
+/// Of the findings of one code what they say and what they say to do.
+fn said(report: &Report, code: &str) -> Vec<(String, String)> {
+    let of = report.findings.iter().filter(|finding| finding.code.0 == code);
+    of.map(|finding| (finding.message.clone(), finding.help.clone().unwrap_or_default())).collect()
+}
+
+#[test]
+fn that_one_was_down_before_anybody_waited_for_it_is_told_where_there_is_too_much_of_it() {
+    let report = checked(TWO_COORDINATOR.to_owned(), 800_000);
+    let message = "from `root.alive.three` only a second `e_end` leads down, and it is raised once".to_owned();
+    let help = "`star/down` comes in `root.alive.three`, where no transition waits for it, and is told once: hear it there as well; else what \
+                is left is taken down without the coordinator"
+        .to_owned();
+    assert_eq!(said(&report, "coord::no_way_down"), [(message, help)], "{:#?}", report.left);
+    // What is left out, and that a larger budget does without.
+    let bounds =
+        |report: &Report| report.left.iter().filter(|bound| bound.contains("subsystems")).cloned().collect::<Vec<_>>();
+    let [bound] = &bounds(&report)[..] else { panic!("{:#?}", report.left) };
+    assert!(bound.contains("or one twice before they tell something"), "{bound}");
+    assert!(bound.ends_with("more than 300000 transitions (`--budget`)"), "{bound}");
+    // Heard in either order.
+    let hears = TWO_COORDINATOR
+        .replace("four: {}", "four: {}\n        five: {}")
+        .replace("        - { src: three, tgt: four,", "        - { src: three, tgt: five, events: [star/down, star/e_off.ignored] }\n        - { src: three, tgt: four,")
+        + "    - { src: .alive.five, tgt: off, events: [port/down, port/e_off.ignored] }\n";
+    let report = checked(hears, 800_000);
+    assert_eq!(said(&report, "coord::no_way_down"), []);
+    assert!(matches!(report.verdict, CheckVerdict::Followed { .. }), "{:#?}", report.findings);
+}
