@@ -116,9 +116,16 @@ impl Beliefs {
             };
             before.iter().filter_map(of).collect()
         };
-        // Where it can take none of them before, more of them lie there.
+        // Where it can take none of them before, more of them lie there; and what came last gives way to this one.
         let after = (self.most_untaken..=MOST_UNTAKEN).map(with).find(|after| !after.is_empty());
-        let after = after.unwrap_or_else(|| before.to_vec());
+        let after = after.unwrap_or_else(|| {
+            let instead = |(state, untaken): &Possible| {
+                let mut untaken = *untaken;
+                untaken[MOST_UNTAKEN - 1] = number;
+                (*state, untaken)
+            };
+            before.iter().map(instead).collect()
+        });
         // Where something has failed nobody can tell.
         let heeds = |(state, untaken): &Possible| {
             let mut takes = self.automaton.leads(*state).iter();

@@ -76,6 +76,8 @@ pub enum Bound {
     Untaken,
     /// [`limits::CHECK_DRIVEN`]: how long a way up or down lasts.
     Times,
+    /// Times that count from when a coordinator began.
+    Clocked,
 }
 
 /// What is not followed where nothing is known of what subsystems tell when.
@@ -188,6 +190,9 @@ impl Bound {
                 effort.believed()
             ),
             Self::Entered => "a coordinator could not be entered".to_owned(),
+            Self::Clocked => "when times that count from the beginning of the coordinator (`e_at`) are over was not followed: at once, each time \
+                              that such a state is entered late, or later than there is time for (`e_after` counts from the state)"
+                .to_owned(),
             Self::Times => {
                 "whether one comes up, or down, in time was not followed to the end: a time may add up to too much, and there are too many \
                  ways to look for the shortest"

@@ -134,6 +134,17 @@ impl Product<'_> {
         if alike.clone().any(known) { None } else { alike.next() }
     }
 
+    /// Whether a subsystem's event is refused while it is being stopped since the deployment that it is part of declares `safety`, and its own file
+    /// does not. What its parent raises comes.
+    fn is_closed_from_outside(&self, name: EventName) -> bool {
+        let own = self.deployment;
+        let until = own.interface.leaving.is_some_and(|leaving| leaving.until == name);
+        let first_or_last = until || [own.deploy.event, own.shutdown.event].contains(&name);
+        own.safety.is_empty()
+            && !first_or_last
+            && self.parent.as_ref().is_some_and(|parent| parent.closes && !parent.raises.contains(&name))
+    }
+
     fn may_raise(&self, name: EventName) -> Raises {
         let deployment = self.deployment;
         let simulated = deployment.kind.imitates;
@@ -141,7 +152,8 @@ impl Product<'_> {
             return Raises::Sometimes;
         }
         // What a subsystem tells nobody can refuse. That something fails nobody can promise, though they may tell it by hand.
-        if self.is_told_by_child(name) || deployment.stays_open(name.as_str()) && !fails(name) {
+        let open = deployment.stays_open(name.as_str()) && !self.is_closed_from_outside(name);
+        if self.is_told_by_child(name) || open && !fails(name) {
             Raises::Somebody
         } else if fails(name) || self.is_reported(name) {
             Raises::Sometimes

@@ -18,7 +18,7 @@ use super::ways;
 use crate::model::MemberClass;
 use crate::model::{
     Catalogue, Change, ChangeKind, ComponentName, ComponentType, ConfigId, Configuration, Deployment, Finding, Ident,
-    StateEntry, StateList, Subsystem, Target, Value, ValueType, Wanted,
+    StateEntry, StateList, Statechart, Subsystem, Target, Value, ValueType, Wanted,
 };
 use crate::stack::contenders::may_hold;
 use std::collections::{BTreeMap, BTreeSet};
@@ -36,10 +36,12 @@ where
         return one(whole, catalogue, around);
     }
     let files = Instances::of(&whole, catalogue);
+    let closes = around.parent.as_ref().map_or(!whole.safety.is_empty(), |parent| parent.closes);
     let check = |file: &Instances<'_>, all: &[&Subsystem], stands_for: bool| {
         let local = catalogue.known_in(file.first.name);
-        let parent = Some(ParentInterface::of(whole.own_part(), all.iter().copied()));
-        run(file.first.own.clone(), &local, &Neighbours { parent, stands_for, ..Neighbours::default() }, one)
+        let parent = Some(ParentInterface::of(whole.own_part(), closes, all.iter().copied()));
+        let around = Neighbours { parent, stands_for, ..Neighbours::default() };
+        run(with_limits_of(&whole, &file.first.own), &local, &around, one)
     };
     let mut checked = side_by_side::each(&files, |file| check(file, &file.all, file.like.is_some()));
     for (at, file) in files.iter().enumerate() {
@@ -84,8 +86,27 @@ where
             report.traces.push(way);
         }
     }
+    if whole.subsystems.iter().any(|subsystem| subsystem.own.charts().any(is_timed)) {
+        let what =
+            "whether ways down through several files are in time, but for that from where all is up, was not followed";
+        report.left.push(what.to_owned());
+        report.explored.complete = false;
+    }
     reports.push((Vec::new(), report));
     (put_together(whole, reports), shows)
+}
+
+/// Whether something of a coordinator takes time.
+fn is_timed(written: &Statechart) -> bool {
+    crate::statechart::compile(written).0.is_some_and(|chart| chart.has_times())
+}
+
+/// A subsystem's file with the limits of the deployment that it is part of: those of its own count where it is deployed alone.
+fn with_limits_of(whole: &Deployment, own: &Arc<Deployment>) -> Arc<Deployment> {
+    match own.limits == whole.limits {
+        true => own.clone(),
+        false => Arc::new(Deployment { limits: whole.limits, ..(**own).clone() }),
+    }
 }
 
 /// Subsystems of one file and the same parameters.

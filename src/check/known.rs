@@ -9,9 +9,17 @@ use crate::model::EventName;
 use std::collections::BTreeSet;
 
 impl<'a> Product<'a> {
+    /// It is part of another deployment.
+    pub(super) fn is_part_of(&mut self, around: &Neighbours) {
+        self.parent = around.parent.clone();
+        if self.parent.as_ref().is_some_and(|parent| parent.closes) {
+            self.from_outside = self.known_outside();
+        }
+    }
+
     /// This is around the deployment; of each subsystem is known what it may tell where so many events lie untaken in its inbox.
     pub(super) fn stands_in(&mut self, around: &Neighbours, most_untaken: usize) {
-        self.parent = around.parent.clone();
+        self.is_part_of(around);
         for child in &mut self.children {
             let local = |event: &EventName| EventName::new(event.local(child.path)?).ok();
             let heard: BTreeSet<EventName> = self.outside.iter().filter_map(local).collect();

@@ -7,7 +7,7 @@
 use super::universe::Universe;
 use crate::model::codes::{CONF_SAFE_LETS_GO, CONF_SAFE_MOVES};
 use crate::model::{
-    Call, ChangeKind, Configuration, Deployment, Finding, Findings, MemberRef, Origin, StateEntry, Target, Wanted,
+    Ask, Call, ChangeKind, Configuration, Deployment, Finding, Findings, MemberRef, Origin, StateEntry, Target, Wanted,
 };
 
 /// What is taken back when a configuration's frame is undone.
@@ -147,7 +147,10 @@ fn moving(first: &Configuration, second: &Configuration, kept: &Kept) -> Finding
         .also(kept.at, format!("`{}` {} here", first.id, kept.does))
         .path(format!("configurations.{}.group", second.id))
         .help(format!(
-            "give `{}` no group: it is then in force over `{}`, and nothing of that is taken back before somebody asks for it; or let it {}",
-            second.id, first.id, kept.keep
+            "give `{}` no group: it is then in force over `{}`, and what moves is taken back where `{}` is asked for, in a later step; or let it {}",
+            second.id,
+            first.id,
+            Ask::UndoOf(first.id),
+            kept.keep
         ))
 }

@@ -13,6 +13,9 @@ pub struct ParentInterface {
     pub raises: BTreeSet<EventName>,
     /// What the parent waits for of what it tells.
     pub hears: BTreeSet<EventName>,
+    /// The deployment that all of it is declares events of safety: while it is being stopped all others from outside are refused, those of subsystems
+    /// too.
+    pub closes: bool,
 }
 
 /// What is around a file.
@@ -28,8 +31,8 @@ pub struct Neighbours {
 
 impl ParentInterface {
     /// What the coordinators of a file raise and hear of subsystems that are followed once.
-    pub fn of<'s>(own: &Deployment, subsystems: impl IntoIterator<Item = &'s Subsystem>) -> Self {
-        let mut interface = Self::default();
+    pub fn of<'s>(own: &Deployment, closes: bool, subsystems: impl IntoIterator<Item = &'s Subsystem>) -> Self {
+        let mut interface = Self { closes, ..Self::default() };
         for alike in subsystems {
             let local = |event: EventName| EventName::new(event.local(alike.name)?).ok();
             for chart in own.charts() {

@@ -171,6 +171,7 @@ fn follow(
     let all: Vec<usize> = (0..charts.len()).collect();
     let mut product = Product::new(deployment, views, charts, &all, catalogue);
     product.follow_with(effort);
+    product.is_part_of(around);
     // Of several coordinators there are too many ways with all that is known of the order in which subsystems tell things.
     if all.len() == 1 {
         product.stands_in(around, MOST_UNTAKEN);
@@ -187,7 +188,9 @@ fn follow(
     if product.untimed {
         left.insert(Bound::Times.told(Failed::Nothing, 0, &effort));
     }
-    for (bound, _) in [(Bound::Ties, product.tied), (Bound::Turns, product.unordered)].iter().filter(|(_, is)| *is) {
+    let clocked = charts.iter().any(|chart| chart.is_clocked());
+    let known = [(Bound::Ties, product.tied), (Bound::Turns, product.unordered), (Bound::Clocked, clocked)];
+    for (bound, _) in known.iter().filter(|(_, is)| *is) {
         left.insert(bound.told(Failed::Nothing, 0, &effort));
         explored.complete = false;
     }

@@ -48,7 +48,7 @@ pub fn ways(product: &mut Product<'_>) -> Traced {
     }
     up.extend(late(product, &rise, DEPLOY_NEVER_UP, "deploy.within_s", "the bring-up"));
     if rise.reached {
-        up.extend(by_hand(product, &rise));
+        up.extend(by_hand(product, &rise, true));
     }
     let mut down = fall.as_ref().map(reasons).unwrap_or_default();
     if let Some(fall) = &fall {
@@ -57,8 +57,9 @@ pub fn ways(product: &mut Product<'_>) -> Traced {
             let stops =
                 || stops(product, fall, DEPLOY_NEVER_DOWN, "shutdown.down", |member| member.down, "the shutdown");
             down.extend((!fall.unfollowed).then(stops));
-        } else if let Some(finding) = leftovers(product, fall.end()) {
-            down.push(finding);
+        } else {
+            down.extend(by_hand(product, fall, false));
+            down.extend(leftovers(product, fall.end()));
         }
     }
     product.never_down = down.iter().any(|finding| finding.code == DEPLOY_NEVER_DOWN);
@@ -260,26 +261,34 @@ fn by_itself(product: &Product<'_>, way: &mut Way) {
     }
 }
 
-/// That the bring-up goes on only when somebody raises an event: nothing in the deployment does. Mostly it is misspelt.
-fn by_hand(product: &Product<'_>, rise: &Way) -> Option<Finding> {
+/// That the way up, or down, goes on only when somebody raises an event: nothing in the deployment does. Mostly it is misspelt.
+fn by_hand(product: &Product<'_>, way: &Way, up: bool) -> Option<Finding> {
     let deployment = product.deployment;
-    let before = std::iter::once(&rise.from).chain(rise.moves.iter().map(|next| &next.state));
-    let (state, event) = before.zip(&rise.moves).find_map(|(state, next)| {
+    let begins = if up { deployment.deploy.event } else { deployment.shutdown.event };
+    let before = std::iter::once(&way.from).chain(way.moves.iter().map(|next| &next.state));
+    let (state, event) = before.zip(&way.moves).find_map(|(state, next)| {
         let event = product.raised_by_hand(state, next.by)?;
-        (event != deployment.deploy.event).then_some((state, event))
+        (event != begins).then_some((state, event))
     })?;
     let place = product.place(state);
     let hears = product.listens(state, event);
     let leaf = hears.map_or(Origin::NONE, |number| product.members[number].chart.origin(state.leaves[number]));
-    let message = format!("the bring-up waits in `{place}` for `{event}`, which nothing here raises");
-    let help = format!(
-        "is it an answer, as `ID.ok`, that leads on? If people raise it, name in `deploy.up` where it waits for them; else it fails {} s after \
-         `{}`",
-        deployment.deploy.within.as_secs_f64(),
-        deployment.deploy.event
-    );
+    let (what, key) = if up { ("bring-up", "deploy.up") } else { ("shutdown", "shutdown.event") };
+    let message = format!("the {what} waits in `{place}` for `{event}`, which nothing here raises");
+    let answer = "is it an answer, as `ID.ok`, that leads on?";
+    let help = match up {
+        true => format!(
+            "{answer} If people raise it, name in `deploy.up` where it waits for them; else it fails {} s after `{begins}`",
+            deployment.deploy.within.as_secs_f64()
+        ),
+        false => format!(
+            "{answer} If people raise it, let a time lead on as well (`e_after(1.0)`); else it is taken down without the coordinator {} s after \
+             `{begins}`",
+            deployment.shutdown.within.as_secs_f64()
+        ),
+    };
     let finding = Finding::warning(DEPLOY_BY_HAND, message).help(help);
-    Some(finding.also(leaf, "waits here").at(deployment.key_origin("deploy.up")).path("deploy.up"))
+    Some(finding.also(leaf, "waits here").at(deployment.key_origin(key)).path(key))
 }
 
 /// The subsystems that nobody ever tells what begins them, or ends them: what to do about it. Of one file only its own are asked for.

@@ -45,6 +45,9 @@ pub trait Listener {
     /// An event triggered nothing.
     fn unmatched(&mut self, event: EventName) {}
 
+    /// An event from outside is not delivered: one of safety came before it was taken up.
+    fn overtaken(&mut self, event: EventName) {}
+
     /// An answer came for a visit that is over; it was not delivered.
     fn stale(&mut self, chart: &Chart, event: EventName, tag: Tag) {}
 

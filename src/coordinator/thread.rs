@@ -264,7 +264,12 @@ impl CoordinatorShared {
             // Taken out and reacted to under one lock, so that an event is always seen to be somewhere.
             let worked = self.react(now, || match self.next(&mut tickets) {
                 Some(incoming) => {
-                    let delivered = core.deliver(incoming.event, incoming.tag, now, &mut listener);
+                    let delivered = if incoming.overtaken {
+                        listener.overtaken(incoming.event);
+                        Delivered::Unmatched
+                    } else {
+                        core.deliver(incoming.event, incoming.tag, now, &mut listener)
+                    };
                     tickets.iter().for_each(|ticket| listener.taken_up(*ticket, delivered));
                     lock(&self.inbox).reacted();
                     true
@@ -360,6 +365,10 @@ impl<L: Listener> Listener for Publisher<'_, L> {
 
     fn unmatched(&mut self, event: EventName) {
         self.tell(|listener| listener.unmatched(event));
+    }
+
+    fn overtaken(&mut self, event: EventName) {
+        self.tell(|listener| listener.overtaken(event));
     }
 
     fn delivers(&mut self, event: EventName) {

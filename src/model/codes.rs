@@ -240,10 +240,11 @@ codes! {
          that fails when everything goes well cannot work: look at the trace for the place where it stops, and at the event it \
          waits for there. Events of components were tried where nothing else could go on. A state listed under `deploy.failed` ends \
          the bring-up as failed: no way up may come to it.";
-    DEPLOY_BY_HAND = "deploy::by_hand", "the bring-up waits for an event that nothing in the deployment raises",
-        "Driven with the deploy event and every request answered `ok`, the coordinator goes on only by an event from outside that no component, \
-         monitor, reaction or coordinator raises. Mostly its name is misspelt, or an answer (`ID.ok`) was meant: then `davit deploy` waits \
-         `deploy.within_s` and gives up. Where people decide at that place, it is up there: name that state in `deploy.up`.";
+    DEPLOY_BY_HAND = "deploy::by_hand", "the bring-up or the shutdown waits for an event that nothing in the deployment raises",
+        "Driven with the event that begins or ends it and every request answered `ok`, the coordinator goes on only by an event from outside that no \
+         component, monitor, reaction or coordinator raises. Mostly its name is misspelt, or an answer (`ID.ok`) was meant: then `davit deploy` waits \
+         `deploy.within_s` and gives up, and `davit shutdown` takes it down without its coordinator after `shutdown.within_s`. Where people decide at \
+         that place on the way up, it is up there: name that state in `deploy.up`. On the way down let a time lead on as well.";
     DEPLOY_NEVER_DOWN = "deploy::never_down", "the shutdown does not reach the state that means down, or not in time",
         "From the state that means up, the coordinator was driven with the shutdown event and every request answered \
          `ok` at once, and did not reach `shutdown.down`, or only after `shutdown.within_s`. It would have to be stopped without its \

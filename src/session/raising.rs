@@ -1,12 +1,15 @@
 //! Events from outside: to all coordinators or to none.
 
 use super::Session;
+use super::halt::Heeded;
+use super::hub::Hub;
 use super::log::Happening;
 use super::names::NotFromOutside;
 use super::parts::CoordinatorPart;
-use super::routes::{Acted, Handles, NO_MORE, make_safe};
+use super::routes::{Handles, NO_MORE};
+use crate::configurator::{Batch, ConfiguratorHandle, Request, Requester};
 use crate::coordinator::{Class, NotAccepted};
-use crate::model::{EventName, Ident};
+use crate::model::{Ask, EventName, Ident, RequestId};
 
 /// An event that was given to all coordinators.
 #[derive(Debug)]
@@ -167,4 +170,28 @@ impl Session {
         }
         if unwatched { Err(NotAccepted::Full.into()) } else { Ok(acted) }
     }
+}
+
+/// What a safety event did that acted by itself.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Acted {
+    /// What it asked for.
+    pub requests: Vec<RequestId>,
+    /// Another one had asked for that just before, and this one is one with it.
+    pub before: bool,
+}
+
+/// A safety event that no coordinator hears any more acts by itself: everything safe is applied. Who sends one again where that
+/// failed wants it tried again; a component may raise it in each update, and is heeded once in a while.
+pub(super) fn make_safe(hub: &Hub, configurator: &ConfiguratorHandle, event: EventName, class: Class) -> Option<Acted> {
+    let failed = |id: &RequestId| hub.answer(*id).is_some_and(|answered| !answered.ok);
+    let anew = |requests: &[RequestId]| class == Class::Outside && requests.iter().any(failed);
+    let Heeded { requests, apply } = hub.halt().heed(event, hub.now(), anew, || hub.number())?;
+    for (id, request) in apply.iter().zip(&requests) {
+        let ask = Ask::Apply(*id);
+        hub.requested(*request, ask, &Requester::Safety.to_string());
+        // A full queue has answered it already.
+        let _ = configurator.submit(Batch::one(Request::new(*request, ask, Requester::Safety)));
+    }
+    Some(Acted { before: apply.is_empty() && !requests.is_empty(), requests })
 }

@@ -1,9 +1,9 @@
 //! The ways between coordinator, configurator and platform: names raised become requests, answers and reports become
 //! events. Called in the threads of those who raise; nothing here waits.
 
-use super::halt::Heeded;
 use super::hub::{Hub, Meaning};
 use super::log::{Happening, LoggedAnswer, StepTime};
+use super::raising::make_safe;
 use super::steps::Steps;
 use super::subsystems::Subsystems;
 use crate::configurator::{Answer, Batch, ConfiguratorHandle, Progress, Reason, Request, Requester, Scope};
@@ -248,6 +248,11 @@ impl Listener for ToConfigurator {
         self.tell_led(false);
     }
 
+    fn overtaken(&mut self, event: EventName) {
+        let note = format!("`{event}` is not heard any more: an event of safety came before it was taken up");
+        self.hub.note(Happening::Noted { note });
+    }
+
     fn taken_up(&mut self, ticket: u64, delivered: Delivered) {
         self.hub.taken_up(ticket, (delivered == Delivered::Taken).then_some(self.name));
         self.of_subsystems(|subsystems, junction| subsystems.tell_ignored(&self.hub, junction));
@@ -473,28 +478,4 @@ pub(super) fn on_platform(hub: &Hub, junction: &Junction, event: &PlatformEvent)
         // Nobody leads any more since just now.
         acts();
     }
-}
-
-/// What a safety event did that acted by itself.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Acted {
-    /// What it asked for.
-    pub requests: Vec<RequestId>,
-    /// Another one had asked for that just before, and this one is one with it.
-    pub before: bool,
-}
-
-/// A safety event that no coordinator hears any more acts by itself: everything safe is applied. Who sends one again where that
-/// failed wants it tried again; a component may raise it in each update, and is heeded once in a while.
-pub(super) fn make_safe(hub: &Hub, configurator: &ConfiguratorHandle, event: EventName, class: Class) -> Option<Acted> {
-    let failed = |id: &RequestId| hub.answer(*id).is_some_and(|answered| !answered.ok);
-    let anew = |requests: &[RequestId]| class == Class::Outside && requests.iter().any(failed);
-    let Heeded { requests, apply } = hub.halt().heed(event, hub.now(), anew, || hub.number())?;
-    for (id, request) in apply.iter().zip(&requests) {
-        let ask = Ask::Apply(*id);
-        hub.requested(*request, ask, &Requester::Safety.to_string());
-        // A full queue has answered it already.
-        let _ = configurator.submit(Batch::one(Request::new(*request, ask, Requester::Safety)));
-    }
-    Some(Acted { before: apply.is_empty() && !requests.is_empty(), requests })
 }

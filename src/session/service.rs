@@ -4,14 +4,14 @@ use super::hub::Hub;
 use super::log::LoggedAnswer;
 use super::members::NoMember;
 use super::names::instead;
+use super::raising::Acted;
 use super::raising::Offered;
-use super::routes::Acted;
 use super::rpc::{GOING_DOWN, INVALID_PARAMS, METHOD_NOT_FOUND, REFUSED, RpcError, TIMED_OUT, only, optional, param};
 use super::serving::Service;
 use super::{Command, NO_FORWARD, NotFromOutside, NotNamed, NotRaised, Session, Unanswered, recovery};
 use crate::limits;
 use crate::model::finding::did_you_mean;
-use crate::model::{Ask, ConfigId, RequestId};
+use crate::model::{Ask, ConfigId, EventName, RequestId};
 use serde_json::{Value as Json, json};
 use std::sync::Weak;
 use std::time::Duration;
@@ -116,7 +116,7 @@ impl Service for SessionService {
             "shutdown" | "status" => true,
             "event" => self.session.upgrade().is_some_and(|session| {
                 let named = params.get("event").and_then(Json::as_str);
-                session.deployment().safety.iter().any(|(event, _)| Some(event.as_str()) == named)
+                named.is_some_and(|named| is_safety(&session, named))
             }),
             _ => false,
         }
@@ -192,6 +192,16 @@ impl Service for SessionService {
     }
 }
 
+/// Whether an event is one of safety, of the deployment or of one of its subsystems.
+fn is_safety(session: &Session, event: &str) -> bool {
+    EventName::new(event).is_ok_and(|event| session.hub().is_safety(event))
+}
+
+/// Whether an event from outside is heard also while it is being stopped.
+fn stays_open(session: &Session, event: &str) -> bool {
+    session.deployment().stays_open(event) || is_safety(session, event)
+}
+
 /// From the first moment of stopping on nothing changes any more what its stages do: but safety events, the shutdown event
 /// and `recover` stay open to the end.
 fn refused_while_stopping(session: &Session, method: &str, params: &Json) -> Result<(), RpcError> {
@@ -199,7 +209,7 @@ fn refused_while_stopping(session: &Session, method: &str, params: &Json) -> Res
         _ if !session.hub().is_stopping() => return Ok(()),
         "apply" | "set" | "undo" | "commit" => format!("`{method}`"),
         "event" => match params.get("event").and_then(Json::as_str) {
-            Some(event) if session.deployment().stays_open(event) => return Ok(()),
+            Some(event) if stays_open(session, event) => return Ok(()),
             Some(event) => format!("`{event}`"),
             None => return Ok(()),
         },

@@ -3,7 +3,7 @@
 use super::halt::StandsStill;
 use super::life::{Ended, UNSEEN, survived};
 use super::log::{Happening, Phase};
-use super::routes::make_safe;
+use super::raising::make_safe;
 use super::stages::{Came, NextStage, Stage, first, next};
 use super::{Command, Session, Unanswered};
 use crate::configurator::{FrameView, TakenDown};

@@ -3,16 +3,16 @@
 //!
 //! Mended first and undone then, a component that is not running, though the platform had said so, would be started to be
 //! stopped at once: it would move, and nobody asked for that. So both are one net, from what is there to what the undo
-//! leads to (semantics: *What goes wrong*).
+//! leads to, with what is undone together with it; and nothing is mended that moves for an undo that is refused then (semantics: *What goes wrong*).
 
 use super::net::is_bound;
 use super::squash::list;
-use super::work::{Op, Planned, transaction};
+use super::work::{Op, Planned, Work, transaction};
 use super::{Broken, Frame, FrameId, HandOver, Inverse, SafeWrites, World, net};
 use crate::model::{ComponentName, MemberRef, Origin, RunState, Snapshot, Step};
 use crate::plan::footprint::{Footprint, Index, Saved, Slot};
 use crate::plan::undo::{DraftStep, Script, absolute};
-use crate::plan::{PlanContext, PlanStage, PlannedStep, SavedValue, StepId};
+use crate::plan::{PlanContext, PlanStage, PlannedStep, Refusal, SavedValue, StepId};
 use crate::system::touch::{self, Access, touches};
 use crate::system::{Overlay, System, View as _, diff, step};
 use smallvec::SmallVec;
@@ -246,7 +246,7 @@ impl World {
         let meant = self.as_meant(broken);
         let mut steps = diff(&self.system, &meant);
         let before = steps.len();
-        steps.retain(|step| !self.is_safe_ones(step, &meant, broken, None));
+        steps.retain(|step| !self.is_safe_ones(step, &meant, broken, &|_| false));
         if steps.len() < before {
             // One that comes after what was left out may not be possible.
             let mut view = Overlay::new(&self.system);
@@ -255,10 +255,10 @@ impl World {
         steps
     }
 
-    /// Whether a step would change what a safe configuration in force, other than the one that is `undone`, wrote or demanded,
+    /// Whether a step would change what a safe configuration in force, other than those that are `undone`, wrote or demanded,
     /// and nobody after it. A component that ends as it is now is only brought to where something may be set, and back.
-    fn is_safe_ones(&self, step: &Step, wanted: &System, broken: &Broken, undone: Option<FrameId>) -> bool {
-        let mut frames = self.stack.frames().iter().rev().filter(|frame| Some(frame.id) != undone);
+    fn is_safe_ones(&self, step: &Step, wanted: &System, broken: &Broken, undone: &dyn Fn(FrameId) -> bool) -> bool {
+        let mut frames = self.stack.frames().iter().rev().filter(|frame| !undone(frame.id));
         if self.stack.safe().next().is_none() {
             return false;
         }
@@ -294,9 +294,39 @@ impl World {
         newest.is_some_and(|frame| frame.safe && !broken.goes_by(frame))
     }
 
+    /// The undo of a frame, with those of others that come first, if what is broken at this place were as it is meant.
+    ///
+    /// # Errors
+    /// [`Refusal`]: it is refused then as well.
+    pub(super) fn undo_as_meant(
+        &self,
+        at: usize,
+        (frame, with): (FrameId, &[FrameId]),
+        context: &PlanContext,
+    ) -> Result<Planned, Refusal> {
+        let wanted = self.as_meant(&self.broken[at]);
+        if with.is_empty() {
+            return transaction(&wanted, &self.stack, &[Op::Undo(frame)], context);
+        }
+        let mut view = Overlay::new(&wanted);
+        let mut work = Work::new(&mut view, &self.stack);
+        work.add_undo(frame, with)?;
+        work.finish(&wanted, None)
+    }
+
+    /// Whether something moves where what is broken at this place is mended.
+    pub(super) fn mending_moves(&self, at: usize) -> bool {
+        diff::moves_any(&diff(&self.system, &self.as_meant(&self.broken[at])), &self.system)
+    }
+
     /// The undo of a frame in one net with what mends what is broken at this place. None: there is nothing that would be
     /// mended to be taken back at once, and each goes by itself.
     pub fn straight(&self, at: usize, frame: FrameId, context: &PlanContext) -> Option<Planned> {
+        self.in_one_net(at, self.undo_as_meant(at, (frame, &[]), context).ok()?)
+    }
+
+    /// The same of an undo that is planned as everything is meant.
+    pub(super) fn in_one_net(&self, at: usize, undo: Planned) -> Option<Planned> {
         let broken = &self.broken[at];
         let wanted = self.as_meant(broken);
         let mend = diff(&self.system, &wanted);
@@ -304,7 +334,6 @@ impl World {
         if mend.is_empty() || out {
             return None;
         }
-        let undo = transaction(&wanted, &self.stack, &[Op::Undo(frame)], context).ok()?;
         let mut end = wanted.clone();
         for planned in undo.steps.iter() {
             step::apply(&planned.step, &mut end).ok()?;
@@ -322,11 +351,16 @@ impl World {
             let whole = diff(&self.system, &end).into_iter().map(alone).collect();
             if calls { None } else { self.leads_to(whole, &end) }
         })?;
-        if steps.iter().any(|planned| self.is_safe_ones(&planned.step, &wanted, broken, Some(frame))) {
+        let undone = |id: FrameId| undo.popped.iter().any(|popped| popped.id == id);
+        if steps.iter().any(|planned| self.is_safe_ones(&planned.step, &wanted, broken, &undone)) {
             return None;
         }
         let mut parts = undo.parts;
-        parts.iter_mut().for_each(|part| part.range = 0..u32::try_from(steps.len()).expect("fewer steps than that"));
+        for part in &mut parts {
+            part.range = 0..u32::try_from(steps.len()).expect("fewer steps than that");
+            // All of it is one.
+            part.along.iter_mut().for_each(|along| along.range = 0..0);
+        }
         let revision = self.system.revision();
         Some(Planned { steps: Arc::new(steps), of: Vec::new(), whole: Vec::new(), parts, revision, ..undo })
     }

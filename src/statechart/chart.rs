@@ -398,6 +398,16 @@ impl Chart {
         self.nodes[leaf.index()].done
     }
 
+    /// Whether it waits for times.
+    pub fn has_times(&self) -> bool {
+        !self.timers.is_empty()
+    }
+
+    /// Whether a time of it counts from when it began (`e_at`).
+    pub fn is_clocked(&self) -> bool {
+        self.timers.iter().any(|timer| !timer.relative)
+    }
+
     /// The time event of a state, where it has one.
     pub fn time_event(&self, state: NodeId) -> Option<EventId> {
         self.timers.get(self.nodes[state.index()].timer as usize).map(|timer| timer.event)

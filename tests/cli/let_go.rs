@@ -18,10 +18,11 @@ fn conveyor() -> Demo {
     demo
 }
 
-/// `check` has nothing against it, and it is led down by its coordinators, with `slow` or whatever is named.
+/// `check` has nothing against it (but that what is safe takes back what moves), and it is led down by its coordinators, with `slow` or whatever is named.
 fn goes_down(demo: &Demo, script: &str, told: &[&str]) {
     let checked = demo.run(&["check", "conveyor.yaml"]);
-    assert!(checked.code == 0 && !checked.err.contains('⚠'), "{}", checked.err);
+    let warned = checked.err.matches('⚠').count();
+    assert!(checked.code == 0 && warned == checked.err.matches("conf::safe_moves").count(), "{}", checked.err);
     demo.write("s.lua", script);
     let ran = demo.run(&["run", "s.lua", "--clock", "simulated"]);
     let missing: Vec<_> = told.iter().filter(|told| !ran.out.contains(*told)).collect();
@@ -101,9 +102,6 @@ fn what_moves_and_was_interrupted_has_to_be_asked_for_by_its_name() {
         "tgt: ready, events: [run.ok] }\n        - { src: ready, tgt: running, events: [e_go] }",
     );
     demo.replace("conveyor.yaml", "up: running", "up: ready");
-    // In one group `hold` would take back what moves: that is warned of (`conf::safe_moves`).
-    demo.replace("configurations.yaml", "    group: speed\n", "");
-    demo.replace("configurations.yaml", "    group: speed\n", "");
     let script = "fault('operation_call belt.lock', 'slow', 1, 0.3)
         deploy('conveyor.yaml') wait(0.5)
         raise('e_go') wait(0.07) raise('e_stop') wait(2)
@@ -214,4 +212,80 @@ fn what_is_safe_and_was_let_go_of_before_it_was_there_goes_on_the_way_down() {
         ran.err
     );
     assert_eq!((ran.code, ran.out.contains("forced")), (0, false), "{}{}", ran.out, ran.err);
+}
+
+/// The platform had said that it started, and it did not: the undo that takes that back does not start it first, whatever goes with it, nor
+/// does one that is refused.
+#[test]
+fn what_stands_still_is_not_started_to_be_taken_back() {
+    let demo = Demo::new();
+    demo.write(
+        "d.yaml",
+        "davit: 1
+name: belt
+platform: simulated
+types:
+  Motor:
+    moves: [start]
+    ports: { speed: { direction: in, type: float } }
+configurations: [c.yaml]
+coordinator: k.yaml
+deploy:   { event: e_start, up: running, within_s: 5 }
+shutdown: { event: e_end, down: off, within_s: 5 }
+",
+    );
+    demo.write(
+        "c.yaml",
+        "configurations:
+  build:
+    changes: [{ create: { component: belt, type: Motor } }]
+    post_conf_state: [\"belt:running\"]
+  slow:
+    changes: [{ port_write: { port: belt.speed, value: 0.1 } }]
+",
+    );
+    demo.write(
+        "k.yaml",
+        "coordinator:
+  states:
+    off: {}
+    building: { entry: build }
+    setting: { entry: slow }
+    running: {}
+    failed: {}
+    slowing: { entry: slow.undo }
+    leaving: { entry: build.undo }
+    left: {}
+  transitions:
+    - { src: initial, tgt: off }
+    - { src: off, tgt: building, events: [e_start] }
+    - { src: building, tgt: setting, events: [build.ok] }
+    - { src: building, tgt: failed, events: [build.failed, build.broken] }
+    - { src: building, tgt: leaving, events: [e_end] }
+    - { src: setting, tgt: running, events: [slow.ok] }
+    - { src: setting, tgt: failed, events: [slow.failed, slow.broken] }
+    - { src: setting, tgt: slowing, events: [e_end] }
+    - { src: failed, tgt: slowing, events: [e_end] }
+    - { src: running, tgt: slowing, events: [e_end] }
+    - { src: slowing, tgt: leaving, events: [slow.undone, slow.undo.failed, slow.undo.broken] }
+    - { src: leaving, tgt: off, events: [build.undone] }
+    - { src: leaving, tgt: left, events: [build.undo.failed, build.undo.broken] }
+    - { src: left, tgt: slowing, events: [e_end] }
+",
+    );
+    let script = |asks: &str| {
+        format!(
+            "fault('start belt', 'lie', 1) deploy('d.yaml') wait(6) {asks} wait(1)
+             for _, entry in ipairs(log{{ since = 5.5 }}) do
+               for _, done in ipairs(entry.steps or {{}}) do assert(done.step ~= 'start belt', 'it is started') end
+               if entry.answer == 'build.undo.failed' then say('refused, ' .. state('belt')) end
+             end
+             shutdown()"
+        )
+    };
+    let kept = "`slow`, whose undo had failed before, was undone with it";
+    goes_down(&demo, &script("raise('e_end')"), &["build.undone", kept]);
+    goes_down(&demo, &script("fault('port_write belt.speed', 'fail', 2) raise('e_end')"), &["build.undone", kept]);
+    // An operator's, which takes nothing along.
+    goes_down(&demo, &script("undo('build', { force = true })"), &["refused, stopped"]);
 }

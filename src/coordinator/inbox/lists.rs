@@ -74,6 +74,15 @@ impl Lists {
         &mut self.nodes[at as usize].incoming
     }
 
+    /// Does something with each of a list, in its order.
+    pub fn for_each_mut(&mut self, list: List, mut each: impl FnMut(&mut Incoming)) {
+        let mut at = self.ends[list as usize].first;
+        while let Some(node) = self.nodes.get_mut(at as usize).filter(|_| at != NONE) {
+            each(&mut node.incoming);
+            at = node.after;
+        }
+    }
+
     /// Puts an event at the end of a list; answers its place, until it is taken out.
     pub fn push(&mut self, list: List, incoming: Incoming) -> u32 {
         let ends = &mut self.ends[list as usize];
