@@ -11,7 +11,7 @@ use super::serving::Service;
 use super::{Command, NO_FORWARD, NotFromOutside, NotNamed, NotRaised, Session, Unanswered, recovery};
 use crate::limits;
 use crate::model::finding::did_you_mean;
-use crate::model::{Ask, ConfigId, EventName, RequestId};
+use crate::model::{Ask, ConfigId, RequestId};
 use serde_json::{Value as Json, json};
 use std::sync::Weak;
 use std::time::Duration;
@@ -116,7 +116,7 @@ impl Service for SessionService {
             "shutdown" | "status" => true,
             "event" => self.session.upgrade().is_some_and(|session| {
                 let named = params.get("event").and_then(Json::as_str);
-                named.is_some_and(|named| is_safety(&session, named))
+                session.deployment().safety.iter().any(|(event, _)| Some(event.as_str()) == named)
             }),
             _ => false,
         }
@@ -192,16 +192,6 @@ impl Service for SessionService {
     }
 }
 
-/// Whether an event is one of safety, of the deployment or of one of its subsystems.
-fn is_safety(session: &Session, event: &str) -> bool {
-    EventName::new(event).is_ok_and(|event| session.hub().is_safety(event))
-}
-
-/// Whether an event from outside is heard also while it is being stopped.
-fn stays_open(session: &Session, event: &str) -> bool {
-    session.deployment().stays_open(event) || is_safety(session, event)
-}
-
 /// From the first moment of stopping on nothing changes any more what its stages do: but safety events, the shutdown event
 /// and `recover` stay open to the end.
 fn refused_while_stopping(session: &Session, method: &str, params: &Json) -> Result<(), RpcError> {
@@ -209,7 +199,7 @@ fn refused_while_stopping(session: &Session, method: &str, params: &Json) -> Res
         _ if !session.hub().is_stopping() => return Ok(()),
         "apply" | "set" | "undo" | "commit" => format!("`{method}`"),
         "event" => match params.get("event").and_then(Json::as_str) {
-            Some(event) if stays_open(session, event) => return Ok(()),
+            Some(event) if session.deployment().stays_open(event) => return Ok(()),
             Some(event) => format!("`{event}`"),
             None => return Ok(()),
         },

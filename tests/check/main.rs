@@ -23,6 +23,7 @@ mod exclusive;
 mod flat_coupling;
 mod flat_plans;
 mod follow;
+mod inside;
 mod overtaken;
 mod pointed;
 mod product;

@@ -688,3 +688,26 @@ fn a_bring_up_that_waits_for_what_nothing_raises_is_told() {
         assert!(said(event, keys).of("deploy::by_hand").is_empty(), "{event} {keys}");
     }
 }
+
+/// On the way down as on the way up; where a time leads on as well nobody has to raise it.
+#[test]
+fn a_shutdown_that_waits_for_what_nothing_raises_is_told() {
+    let life = |event: &str| {
+        format!(
+            "idle = state {{}}, building = state {{ entry = 'base' }}, up = state {{}}, asking = state {{}}, leaving = state {{ entry = 'base.undo' }},
+             trans {{ src = 'initial', tgt = 'idle' }},
+             trans {{ src = 'idle', tgt = 'building', events = {{ 'e_start' }} }},
+             trans {{ src = 'building', tgt = 'up', events = {{ 'base.ok' }} }},
+             trans {{ src = 'building', tgt = 'leaving', events = {{ 'base.failed', 'base.broken', 'e_shutdown' }} }},
+             trans {{ src = 'up', tgt = 'asking', events = {{ 'e_shutdown' }} }},
+             trans {{ src = 'asking', tgt = 'leaving', events = {{ {event} }} }},
+             trans {{ src = 'leaving', tgt = 'idle', events = {{ 'base.undone', 'base.undo.failed', 'base.undo.broken' }} }},"
+        )
+    };
+    let said = |event: &str| Small::new(BASE, &life(event), "").check();
+    let told = said("'e_yes'");
+    let finding = only(&told, "deploy::by_hand");
+    assert_eq!(finding["message"], "the shutdown waits in `root.asking` for `e_yes`, which nothing here raises");
+    assert_eq!(finding["severity"], "warning");
+    assert!(said("'e_yes', 'e_after(1.0)'").of("deploy::by_hand").is_empty());
+}

@@ -53,6 +53,19 @@ fn one_that_fails_in_part_stays_and_is_undone_to_what_is_in_force() {
     assert_eq!(said(&demo, &at_once), ["stopped nil", "reset nil"]);
 }
 
+/// Who lets go of it, and stops it again before that was heard, has it stopped: what comes last counts, though safety is heard first.
+#[test]
+fn a_stop_that_comes_last_is_the_last_word() {
+    let story = "deploy('deployment.yaml') raise('e_stop') wait_answer('stop.ok', 1)
+         raise('e_reset') raise('e_stop') wait(1) wait_state('stopped', 0)
+         for _, frame in ipairs(stack()) do if frame.configuration == 'stop' then say('in force') end end
+         for _, entry in ipairs(log{ since = 0 }) do if entry.what == 'noted' then say(entry.note) end end
+         raise('e_stop') raise('e_reset') wait_state('failed', 1) say('let go')
+         shutdown()";
+    let overtaken = "`e_reset` is not heard any more: an event of safety came before it was taken up";
+    assert_eq!(said(&belt(), story), ["in force", overtaken, "let go"]);
+}
+
 /// Who recovers puts right what differs, and does not let go of what holds: that is done by its own undo. Applied once more, and whole, it
 /// lacks nothing any more, and nothing is broken.
 #[test]

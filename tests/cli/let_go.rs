@@ -20,7 +20,8 @@ fn conveyor() -> Demo {
 
 /// `check` has nothing against it (but that what is safe takes back what moves), and it is led down by its coordinators, with `slow` or whatever is named.
 fn goes_down(demo: &Demo, script: &str, told: &[&str]) {
-    let checked = demo.run(&["check", "conveyor.yaml"]);
+    let file = if script.contains("d.yaml") { "d.yaml" } else { "conveyor.yaml" };
+    let checked = demo.run(&["check", file]);
     let warned = checked.err.matches('⚠').count();
     assert!(checked.code == 0 && warned == checked.err.matches("conf::safe_moves").count(), "{}", checked.err);
     demo.write("s.lua", script);

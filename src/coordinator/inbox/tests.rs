@@ -334,6 +334,27 @@ fn what_begins_and_what_ends_come_in_the_order_in_which_they_came_last() {
     assert_eq!(order, [name(2), name(1), name(0)]);
 }
 
+/// Who raised something before a stop did not know of it: only what comes after it is heard. What begins and ends the deployment is no such word.
+#[test]
+fn what_waits_from_outside_is_overtaken_by_safety() {
+    let mut inbox = Inbox::within(SMALL, []);
+    inbox.push(Incoming::new(Class::Report, name(0))).unwrap();
+    inbox.push(Incoming::new(Class::Outside, name(1)).watched(7)).unwrap();
+    inbox.push(Incoming { last: true, ..Incoming::new(Class::Urgent, name(2)) }).unwrap();
+    let told = |inbox: &mut Inbox| {
+        let mut tickets = Vec::new();
+        let taken = inbox.pop(&mut tickets).unwrap();
+        (taken.event, taken.overtaken, tickets)
+    };
+    assert_eq!(told(&mut inbox), (name(2), false, vec![]));
+    inbox.push(Incoming::new(Class::Urgent, name(3))).unwrap();
+    inbox.push(Incoming::new(Class::Outside, name(4))).unwrap();
+    assert_eq!(told(&mut inbox), (name(3), false, vec![]));
+    assert_eq!(told(&mut inbox), (name(0), false, vec![]));
+    assert_eq!(told(&mut inbox), (name(1), true, vec![7]), "whoever raised it is told");
+    assert_eq!(told(&mut inbox), (name(4), false, vec![]));
+}
+
 /// What has come, and is taken between: of each class as many events as make no turns necessary.
 fn arrivals() -> impl Strategy<Value = Vec<Option<(usize, Class)>>> {
     let low = prop_oneof![Just(Class::Report), Just(Class::Outside)];
