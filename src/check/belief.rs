@@ -9,7 +9,7 @@ use super::automaton::{InterfaceAction, InterfaceAutomaton};
 use super::state::Failed;
 use crate::model::{EventName, Precedence, SubsystemStanding, precedence::taken_first};
 use indexmap::IndexSet;
-use rustc_hash::{FxBuildHasher, FxHashMap, FxHashSet};
+use rustc_hash::{FxBuildHasher, FxHashMap};
 use smallvec::SmallVec;
 use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
@@ -31,8 +31,11 @@ pub type MayTell = Rc<[(EventName, Failed, u32)]>;
 /// What was raised last, since it has told something, and how often: where that is known.
 type Repeated = Option<(u8, u8)>;
 
-/// What may be.
-type Belief = Rc<[Possible]>;
+/// A possible thing by its number, from 0 on in the order in which they were met.
+type PossibleId = u32;
+
+/// What may be, in the order of the numbers.
+type Belief = Rc<[PossibleId]>;
 
 /// What may be known of a subsystem. Known things are numbers from 0 (the start) on.
 #[derive(Debug, Clone)]
@@ -45,6 +48,12 @@ pub struct Beliefs {
     takes: Vec<(EventName, Precedence)>,
     /// What others raise for it of whom nothing is known here: that comes at any time.
     others: BTreeSet<EventName>,
+    possible: IndexSet<Possible, FxBuildHasher>,
+    /// Of each possible thing, once somebody has asked: what it may be next without the parent seeing it.
+    silent: Vec<Option<Rc<[PossibleId]>>>,
+    /// In which set each was met last, while one is made.
+    met: Vec<u32>,
+    making: u32,
     sets: IndexSet<(Belief, Repeated), FxBuildHasher>,
     tells: FxHashMap<u32, MayTell>,
     raised: FxHashMap<(u32, u8), (u32, bool)>,
@@ -63,7 +72,10 @@ impl Beliefs {
     ) -> Self {
         let start = automaton.start();
         let (sets, tells, raised) = (IndexSet::default(), FxHashMap::default(), FxHashMap::default());
-        let mut beliefs = Self { automaton, most_untaken, heard, takes, others, sets, tells, raised };
+        let possible = IndexSet::default();
+        let (silent, met, making) = (Vec::new(), Vec::new(), 0);
+        let mut beliefs =
+            Self { automaton, most_untaken, heard, takes, others, possible, silent, met, making, sets, tells, raised };
         beliefs.of([(start, [0; MOST_UNTAKEN])], None);
         beliefs
     }
@@ -79,13 +91,13 @@ impl Beliefs {
             return known.clone();
         }
         let mut after: BTreeMap<(EventName, Failed), Vec<Possible>> = BTreeMap::new();
-        for (state, untaken) in self.sets[belief as usize].0.iter() {
-            for (by, to) in self.automaton.leads(*state) {
+        for (state, untaken) in self.all_of(belief) {
+            for (by, to) in self.automaton.leads(state) {
                 if let InterfaceAction::Tells(event, failed) = by
                     && self.heard.contains(event)
-                    && is_told(*event, *untaken)
+                    && is_told(*event, untaken)
                 {
-                    after.entry((*event, *failed)).or_default().push((*to, *untaken));
+                    after.entry((*event, *failed)).or_default().push((*to, untaken));
                 }
             }
         }
@@ -102,7 +114,8 @@ impl Beliefs {
         if let Some(known) = self.raised.get(&(belief, number)) {
             return *known;
         }
-        let (before, repeated) = self.sets[belief as usize].clone();
+        let before: Vec<Possible> = self.all_of(belief).collect();
+        let repeated = self.sets[belief as usize].1;
         let times = repeated.filter(|(last, _)| *last == number).map_or(0, |(_, times)| times);
         let repeated = (self.most_untaken < MOST_UNTAKEN).then_some((number, times + 1));
         if repeated.is_some() && times >= MOST_REPEATED {
@@ -139,33 +152,60 @@ impl Beliefs {
         known
     }
 
+    /// The possible things that a belief has.
+    fn all_of(&self, belief: u32) -> impl Iterator<Item = Possible> + '_ {
+        self.sets[belief as usize].0.iter().map(|number| self.possible[*number as usize])
+    }
+
     /// What is known where it is in one of these, or silently got on from there.
     fn of(&mut self, some: impl IntoIterator<Item = Possible>, repeated: Repeated) -> u32 {
-        let mut met: FxHashSet<Possible> = FxHashSet::default();
-        let mut open: Vec<Possible> = some.into_iter().collect();
-        while let Some((state, untaken)) = open.pop() {
-            if !met.insert((state, untaken)) {
-                continue;
-            }
-            let taken = self.taken(untaken);
-            for (by, to) in self.automaton.leads(state) {
-                match by {
-                    InterfaceAction::Silent => open.push((*to, untaken)),
-                    InterfaceAction::Tells(event, _) if self.heard.contains(event) => {}
-                    InterfaceAction::Tells(event, _) if !is_told(*event, untaken) => {}
-                    InterfaceAction::Tells(..) => open.push((*to, untaken)),
-                    InterfaceAction::Takes { event, .. } => {
-                        open.extend(self.others.contains(event).then_some((*to, untaken)));
-                        let rest = taken.iter().filter(|(taken, _)| taken == event);
-                        open.extend(rest.map(|(_, rest)| (*to, *rest)));
-                    }
-                }
+        self.making += 1;
+        let mut open: Vec<PossibleId> = some.into_iter().map(|of| self.number_of(of)).collect();
+        let mut set: Vec<PossibleId> = Vec::with_capacity(open.len());
+        while let Some(number) = open.pop() {
+            if std::mem::replace(&mut self.met[number as usize], self.making) != self.making {
+                set.push(number);
+                open.extend(self.silently(number).iter());
             }
         }
-        let mut set: Vec<Possible> = met.into_iter().collect();
         set.sort_unstable();
         let set: Belief = set.into();
         u32::try_from(self.sets.insert_full((set, repeated)).0).unwrap_or(u32::MAX)
+    }
+
+    fn number_of(&mut self, of: Possible) -> PossibleId {
+        let (number, is_new) = self.possible.insert_full(of);
+        if is_new {
+            self.silent.push(None);
+            self.met.push(0);
+        }
+        u32::try_from(number).unwrap_or(u32::MAX)
+    }
+
+    /// What something possible may be next without the parent seeing it: one step of it.
+    fn silently(&mut self, number: PossibleId) -> Rc<[PossibleId]> {
+        if let Some(known) = &self.silent[number as usize] {
+            return known.clone();
+        }
+        let (state, untaken) = self.possible[number as usize];
+        let mut next: Vec<Possible> = Vec::new();
+        let taken = self.taken(untaken);
+        for (by, to) in self.automaton.leads(state) {
+            match by {
+                InterfaceAction::Silent => next.push((*to, untaken)),
+                InterfaceAction::Tells(event, _) if self.heard.contains(event) => {}
+                InterfaceAction::Tells(event, _) if !is_told(*event, untaken) => {}
+                InterfaceAction::Tells(..) => next.push((*to, untaken)),
+                InterfaceAction::Takes { event, .. } => {
+                    next.extend(self.others.contains(event).then_some((*to, untaken)));
+                    let rest = taken.iter().filter(|(taken, _)| taken == event);
+                    next.extend(rest.map(|(_, rest)| (*to, *rest)));
+                }
+            }
+        }
+        let next: Rc<[PossibleId]> = next.into_iter().map(|of| self.number_of(of)).collect();
+        self.silent[number as usize] = Some(next.clone());
+        next
     }
 
     /// What it may take next of what it has not taken, each with what is left then: of some of it the rest may not have come yet.

@@ -344,7 +344,7 @@ fn who_recovers_looks_first() {
 /// Who accepts what is there accepts what is seen then, and not what was told before.
 #[test]
 fn who_accepts_looks_first() {
-    let demo = super::emergency::belt();
+    let demo = belt();
     demo.write(
         "belt/own.lua",
         "deploy('deployment.yaml') fault('port_write motor.speed', 'lie', 1) raise('e_faster') wait_answer('fast.ok', 1)
