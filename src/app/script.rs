@@ -236,7 +236,7 @@ fn no_unknown_names(path: &Path, text: &[u8], lua: &Lua) -> Result<(), ScriptFai
         let at = sources.exact(file, one.line, one.column, one.length);
         Finding::error(LUA_UNDEFINED, format!("`{}` is not defined", one.name))
             .at(at)
-            .help(meant(&one.name))
+            .help(meant(&one.name, one.near.as_deref()))
             .labelled("here")
     };
     let findings = unknown.into_iter().map(finding).collect();
@@ -244,7 +244,10 @@ fn no_unknown_names(path: &Path, text: &[u8], lua: &Lua) -> Result<(), ScriptFai
 }
 
 /// What may be meant by a name that there is not.
-fn meant(name: &str) -> String {
+fn meant(name: &str, near: Option<&str>) -> String {
+    if let Some(near) = near {
+        return format!("did you mean `{near}`?");
+    }
     // What Lua has for it elsewhere is near nothing here.
     match name {
         "print" => "did you mean `say`?".to_owned(),
@@ -350,7 +353,7 @@ fn install(lua: &Lua, host: &SharedHost) -> mlua::Result<()> {
     meta.set(
         "__index",
         lua.create_function(|_, (_, name): (Table, String)| -> mlua::Result<LuaValue> {
-            Err(error(format!("`{name}` is not defined: {}", meant(&name))))
+            Err(error(format!("`{name}` is not defined: {}", meant(&name, None))))
         })?,
     )?;
     globals.set_metatable(Some(meta))

@@ -142,7 +142,7 @@ impl Product<'_> {
         let first_or_last = until || [own.deploy.event, own.shutdown.event].contains(&name);
         own.safety.is_empty()
             && !first_or_last
-            && self.parent.as_ref().is_some_and(|parent| parent.closes && !parent.raises.contains(&name))
+            && self.parent.as_ref().is_some_and(|parent| parent.closes && !parent.raises_for_all.contains(&name))
     }
 
     fn may_raise(&self, name: EventName) -> Raises {

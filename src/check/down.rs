@@ -82,6 +82,10 @@ impl Graph<'_, '_> {
                 .also(deployment.key_origin("shutdown.down"), "the state that means down")
                 .help(help)
         };
+        let mut finding = finding;
+        if self.product.knows_less() {
+            finding.severity = Severity::Info;
+        }
         let trace = self.trace(at);
         found.push((finding, trace));
     }
@@ -208,7 +212,8 @@ impl Graph<'_, '_> {
                         missed.into_iter().fold(graph.barred(at, barred, &bars, &before), Finding::help)
                     }
                 };
-                found_at(self, some, barred != Barred::Reported, &tell);
+                let certain = barred != Barred::Reported && (barred == Barred::Again || !self.product.knows_less());
+                found_at(self, some, certain, &tell);
             }
             (before, before_well) = (after, after_well);
         }

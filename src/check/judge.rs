@@ -455,7 +455,10 @@ impl Graph<'_, '_> {
             let leaf = leaves[0];
             if self.product.waits_for_unbegun(&self.states[at as usize], 0).is_none() && told.insert(leaves) {
                 let finding = self.product.nothing_leads_on(leaf);
-                let finding = self.told_before(leaf).into_iter().fold(finding, Finding::help);
+                let mut finding = self.told_before(leaf).into_iter().fold(finding, Finding::help);
+                if self.product.knows_less() {
+                    finding.severity = Severity::Info;
+                }
                 let trace = self.trace(at);
                 found.push((finding, trace));
             }

@@ -1,6 +1,6 @@
 //! What is known of the subsystems of the deployment that is followed.
 
-use super::belief::Beliefs;
+use super::belief::{Beliefs, MOST_UNTAKEN};
 use super::bound::Bound;
 use super::effort::Left;
 use super::neighbours::{Neighbours, accepted};
@@ -44,6 +44,12 @@ impl<'a> Product<'a> {
     /// Whether nothing is known of the order in which one of them tells things.
     pub(super) fn knows_no_order(&self) -> bool {
         self.children.iter().any(|child| child.beliefs.is_none())
+    }
+
+    /// Whether it is not known what comes of what is raised again before a subsystem tells something: it may lead on where nothing does here.
+    pub(super) fn knows_less(&self) -> bool {
+        let mut known = self.children.iter().filter_map(|child| child.beliefs.as_ref());
+        known.any(|beliefs| beliefs.most_untaken() < MOST_UNTAKEN)
     }
 
     /// Less is known of them from now on: that each takes an event before the next one comes; then nothing, so that they may tell anything in any

@@ -7,7 +7,7 @@
 use super::universe::Universe;
 use crate::model::codes::{CONF_SAFE_LETS_GO, CONF_SAFE_MOVES};
 use crate::model::{
-    Ask, Call, ChangeKind, Configuration, Deployment, Finding, Findings, MemberRef, Origin, StateEntry, Target, Wanted,
+    Ask, Call, ChangeKind, Configuration, Deployment, Finding, Findings, MemberRef, Origin, StateEntry, Target,
 };
 
 /// What is taken back when a configuration's frame is undone.
@@ -57,34 +57,15 @@ fn taken_back<'c>(
     })
 }
 
-/// What moves when the first one, which is not safe, is taken back.
+/// What moves when the first one, which is not safe, is taken back: an operation. Whether a run state is taken back depends on where it is applied.
 fn moves_back(first: &Configuration, second: &Configuration, universe: &Universe) -> Option<Kept> {
-    let called = taken_back(first, second, universe).find(|(_, by, _)| universe.moves(*by));
-    let called = called.map(|(operation, by, at)| Kept {
+    let (operation, by, at) = taken_back(first, second, universe).find(|(_, by, _)| universe.moves(*by))?;
+    Some(Kept {
         at,
         does: "calls it".to_owned(),
         back: format!("`{by}` moves, and takes `{operation}` back"),
         keep: format!("call `{operation}` too: it then stays"),
-    });
-    let before = |entry: StateEntry| first.pre.iter().find(|other| other.target == entry.target);
-    let brought = || {
-        first.post.iter().find_map(|entry| {
-            let Target::Component(component) = entry.target else { return None };
-            // What it finds so and leaves so is not taken back.
-            let stays = before(entry).is_some_and(|before| before.state == entry.state);
-            let theirs = second.pre.iter().chain(second.post.iter()).any(|other| other.target == entry.target);
-            let moves = universe.of(component).iter().filter_map(|creation| creation.description.as_ref()).any(|ty| {
-                entry.state == Wanted::Running && ty.moves.stop || entry.state == Wanted::Stopped && ty.moves.start
-            });
-            (!stays && !theirs && moves).then(|| Kept {
-                at: entry.origin,
-                does: "brings it to a run state".to_owned(),
-                back: format!("`{component}` moves when its run state is taken back"),
-                keep: format!("bring `{component}` to a run state too"),
-            })
-        })
-    };
-    called.or_else(brought)
+    })
 }
 
 /// What the first one has made safe, and the second one does nothing about.
@@ -147,7 +128,8 @@ fn moving(first: &Configuration, second: &Configuration, kept: &Kept) -> Finding
         .also(kept.at, format!("`{}` {} here", first.id, kept.does))
         .path(format!("configurations.{}.group", second.id))
         .help(format!(
-            "give `{}` no group: it is then in force over `{}`, and what moves is taken back where `{}` is asked for, in a later step; or let it {}",
+            "give `{}` a group of its own: it is then in force over `{}`, and what moves is taken back where `{}` is asked for, in a later step; or let \
+             it {}",
             second.id,
             first.id,
             Ask::UndoOf(first.id),

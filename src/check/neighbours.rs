@@ -11,6 +11,8 @@ use std::sync::Arc;
 pub struct ParentInterface {
     /// What the parent raises of what it accepts.
     pub raises: BTreeSet<EventName>,
+    /// What it raises for each of those that are followed as one.
+    pub raises_for_all: BTreeSet<EventName>,
     /// What the parent waits for of what it tells.
     pub hears: BTreeSet<EventName>,
     /// The deployment that all of it is declares events of safety: while it is being stopped all others from outside are refused, those of subsystems
@@ -33,14 +35,19 @@ impl ParentInterface {
     /// What the coordinators of a file raise and hear of subsystems that are followed once.
     pub fn of<'s>(own: &Deployment, closes: bool, subsystems: impl IntoIterator<Item = &'s Subsystem>) -> Self {
         let mut interface = Self { closes, ..Self::default() };
-        for alike in subsystems {
+        for (at, alike) in subsystems.into_iter().enumerate() {
             let local = |event: EventName| EventName::new(event.local(alike.name)?).ok();
             for chart in own.charts() {
                 interface.hears.extend(chart.waited_for().into_iter().filter_map(local));
             }
             let raised = accepted(alike).into_iter();
             let raised = raised.filter(|event| own.charts().any(|chart| chart.raises(event.as_str())));
-            interface.raises.extend(raised.filter_map(local));
+            let raised: BTreeSet<EventName> = raised.filter_map(local).collect();
+            interface.raises_for_all = match at {
+                0 => raised.clone(),
+                _ => interface.raises_for_all.intersection(&raised).copied().collect(),
+            };
+            interface.raises.extend(raised);
         }
         interface
     }

@@ -106,7 +106,9 @@ impl Engine {
     /// Recovers what is broken; the error is what remains. Answers whether something was.
     pub(super) fn recover(&mut self, direction: Recovery) -> Result<bool, Arc<Residual>> {
         // Whoever asks has often seen it before the slow look has.
-        self.compare_all();
+        if direction == Recovery::Back {
+            self.compare_all();
+        }
         let partial = self.world.stack.frames().iter().any(|frame| self.world.stack.is_in_part(frame));
         if self.world.broken.is_empty() && !partial {
             return Ok(false);

@@ -4,6 +4,7 @@
 //! or is assigned to anywhere; and a text that goes about its globals itself (`_G`, `_ENV`) is left alone.
 
 use super::tokens::{Token, tokens};
+use crate::model::finding::nearest;
 use rustc_hash::FxHashSet;
 
 /// Lua's own words.
@@ -23,6 +24,8 @@ pub struct UnknownName {
     pub column: u32,
     /// In characters.
     pub length: u32,
+    /// The name that the text declares and that may be meant.
+    pub near: Option<String>,
 }
 
 /// The names that are read and not declared, each once, in the order of the text. `known`: those that are there before it runs.
@@ -38,7 +41,10 @@ pub fn unknown_names(text: &str, known: impl Fn(&str) -> bool) -> Vec<UnknownNam
         let unknown = is_name(token) && is_read(&all, at) && !declared.contains(token.text) && !known(token.text);
         if unknown && told.insert(token.text) {
             let Token { text, line, column, length, .. } = *token;
-            found.push(UnknownName { name: text.to_owned(), line, column, length });
+            let mut own: Vec<&str> = declared.iter().copied().collect();
+            own.sort_unstable();
+            let near = nearest(text, own).map(str::to_owned);
+            found.push(UnknownName { name: text.to_owned(), line, column, length, near });
         }
     }
     found
@@ -61,9 +67,27 @@ fn is_read(all: &[Token<'_>], at: usize) -> bool {
     !member && !number && !attribute && before(1) != "goto" && all.get(at + 1).is_none_or(|next| next.text != "=")
 }
 
+/// Of each token whether it stands in a table itself, and not in a function there: what stands before `=` is a key then, and no name.
+fn in_tables(all: &[Token<'_>]) -> Vec<bool> {
+    // Of what is open whether it is a table.
+    let mut open: Vec<bool> = Vec::new();
+    let of = |token: &Token<'_>| {
+        match token.text {
+            "{" => open.push(true),
+            // `while` and `for` are open from their `do` on.
+            "if" | "do" | "function" | "repeat" => open.push(false),
+            "}" | "end" | "until" => _ = open.pop(),
+            _ => {}
+        }
+        open.last() == Some(&true)
+    };
+    all.iter().map(of).collect()
+}
+
 /// All names that the text declares somewhere.
 fn declared<'t>(all: &[Token<'t>]) -> FxHashSet<&'t str> {
     let mut declared = FxHashSet::default();
+    let in_table = in_tables(all);
     let names = |from: usize, until: &[&str]| {
         let list = all[from..].iter().take_while(|token| !until.contains(&token.text));
         list.filter(|token| is_name(token)).map(|token| token.text).collect::<Vec<_>>()
@@ -90,7 +114,7 @@ fn declared<'t>(all: &[Token<'t>]) -> FxHashSet<&'t str> {
                     next += 1;
                 }
             }
-            "=" => {
+            "=" if !in_table[at] => {
                 // `a, b = …`
                 let mut last = at;
                 while let Some(name) = last.checked_sub(1).map(|at| all[at]).filter(is_name) {
@@ -122,6 +146,12 @@ mod tests {
             unknown("say('a')\n  rasie(\"e\") rasie('e')\nsay(x .. y)"),
             [("rasie".to_owned(), 2, 2), ("x".to_owned(), 3, 4), ("y".to_owned(), 3, 9),]
         );
+        // What stands before a key of a table is a value.
+        assert_eq!(unknown("say{ far, key = 1 }"), [("far".to_owned(), 1, 5)]);
+        assert_eq!(unknown("say(far, { near, key = 1 })").len(), 2);
+        let near = |text| unknown_names(text, |name| name == "say").remove(0).near;
+        assert_eq!(near("local limit = 1 say(limti)"), Some("limit".to_owned()));
+        assert_eq!(near("local limit = 1 say(other)"), None);
     }
 
     #[test]
@@ -131,6 +161,8 @@ mod tests {
             "local function f(x, y, ...) return x + y + select end select = 1 f()",
             "function t.f(x) return x end t = {} t.u = t.v t:w()",
             "a, b = 1, 2 say(a, b)",
+            "local t = { f = function() if t then a, b = 1, 2 end for i = 1, 2 do c, d = i, i end return a + b + c + d end, key = 1 }",
+            "say{ function() repeat a, b = 1, 2 until a while b do b, c = a, b end return c end, key = 1 }",
             "for i, v in ipairs{ 1, 2 } do say(i + v) end for k = 1, 2 do say(k) end",
             "local t = { key = 1, ['other'] = 2 } say(t.key, string.format('%d', 3))",
             "do goto on end ::on:: say('it')",

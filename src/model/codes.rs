@@ -336,8 +336,9 @@ codes! {
          ask for at any time. `on_failure` says something else of failures. Leave it out.";
     CONF_SAFE_MOVES = "conf::safe_moves", "a safe configuration takes back something that moves",
         "A safe configuration has a `group`, so that it takes the place of whatever is in force of that: the frame of that one is undone, and \
-         something of it moves when it is taken back. In an emergency that moves which is to be stopped. Give the safe one no group: it is in force \
-         over the other one then, and nothing of its part moves before somebody asks for that.";
+         something of it moves when it is taken back. In an emergency that moves which is to be stopped. Give the safe one a \
+         group of its own: it is in force over the other one then, and that moves where somebody asks for its undo. What a run state leads to is not \
+         looked at.";
     CONF_SAFE_LETS_GO = "conf::safe_lets_go", "a safe configuration lets go of what another one has made safe",
         "Two safe configurations are alternatives (`group`), so that applying the second one undoes the first one's frame: what \
          that has called, and what an operation takes back, set, or brought to a run state is taken back before the second one acts. \

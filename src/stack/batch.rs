@@ -94,7 +94,7 @@ enum ResolvedRequest<'a> {
 /// What the first requests of a batch (arranged, not empty) come to in `world`: as many as are carried out together.
 pub fn take_up(world: &World, requests: &[Request], rules: &Rules<'_>) -> Group {
     let together = together(world, requests, rules.joined);
-    let mut repairs = (together == 1).then(|| repairs(world, &requests[0])).flatten();
+    let repairs = (together == 1).then(|| repairs(world, &requests[0])).flatten();
     let avoiding;
     let whole = world.broken.is_empty() && world.quarantined.is_empty();
     let context = if whole {
@@ -120,25 +120,18 @@ pub fn take_up(world: &World, requests: &[Request], rules: &Rules<'_>) -> Group 
                     let let_go =
                         |frame: &FrameId| world.stack.frame(*frame).is_some_and(|frame| request.lets_go_of(frame));
                     let visit = if let Op::Undo(frame) = &op { Some(*frame).filter(let_go) } else { None };
-                    if let (Some(at), Op::Undo(frame)) = (repairs, &op) {
-                        let with = taken_along(world, &work, request, *frame, (rules, true));
-                        match with.and_then(|with| world.undo_as_meant(at, (*frame, &with), context)) {
-                            Ok(undo) => {
-                                if let Some(planned) = world.in_one_net(at, undo) {
-                                    group.mends = Some(world.broken[at].residual.clone());
-                                    group.places.push(place);
-                                    group.visits.push(visit);
-                                    return with_plan(world, requests, group, planned, rules);
-                                }
-                            }
-                            // Nothing moves for what is refused then.
-                            Err(refusal) if world.mending_moves(at) => {
-                                refused.push(no(place, request, Reason::Refused(refusal.findings)));
-                                repairs = None;
-                                continue 'anew;
-                            }
-                            Err(_) => {}
-                        }
+                    let meant = |(at, frame): (usize, FrameId)| {
+                        let with = taken_along(world, &work, request, frame, (rules, true)).ok()?;
+                        let undo = world.undo_as_meant(at, (frame, &with), context).ok()?;
+                        Some((at, world.in_one_net(at, undo)?))
+                    };
+                    if let (Some(at), Op::Undo(frame)) = (repairs, &op)
+                        && let Some((at, planned)) = meant((at, *frame))
+                    {
+                        group.mends = Some(world.broken[at].residual.clone());
+                        group.places.push(place);
+                        group.visits.push(visit);
+                        return with_plan(world, requests, group, planned, rules);
                     }
                     if let Err(refusal) = add(world, &mut work, request, &op, (rules, context), repairs.is_some()) {
                         refused.push(no(place, request, Reason::Refused(refusal.findings)));

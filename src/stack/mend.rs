@@ -3,7 +3,7 @@
 //!
 //! Mended first and undone then, a component that is not running, though the platform had said so, would be started to be
 //! stopped at once: it would move, and nobody asked for that. So both are one net, from what is there to what the undo
-//! leads to, with what is undone together with it; and nothing is mended that moves for an undo that is refused then (semantics: *What goes wrong*).
+//! leads to, with what is undone together with it (semantics: *What goes wrong*).
 
 use super::net::is_bound;
 use super::squash::list;
@@ -312,11 +312,6 @@ impl World {
         let mut work = Work::new(&mut view, &self.stack);
         work.add_undo(frame, with)?;
         work.finish(&wanted, None)
-    }
-
-    /// Whether something moves where what is broken at this place is mended.
-    pub(super) fn mending_moves(&self, at: usize) -> bool {
-        diff::moves_any(&diff(&self.system, &self.as_meant(&self.broken[at])), &self.system)
     }
 
     /// The undo of a frame in one net with what mends what is broken at this place. None: there is nothing that would be
