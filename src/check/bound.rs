@@ -72,8 +72,6 @@ pub enum Bound {
     Told,
     /// [`limits::CHECK_BELIEVED`]: the same.
     Forgotten,
-    /// [`limits::CHECK_BELIEVED`]: that several events lie untaken in a subsystem's inbox, or one comes twice.
-    Untaken,
     /// [`limits::CHECK_DRIVEN`]: how long a way up or down lasts.
     Times,
     /// Times that count from when a coordinator began.
@@ -184,11 +182,6 @@ impl Bound {
             Self::Forgotten => {
                 format!("{TOLD}, for with that there are more than {} transitions (`--budget`)", effort.believed())
             }
-            Self::Untaken => format!(
-                "that subsystems take an event after the next one has come, or one twice before they tell something, was not followed, for \
-                 with that there are more than {} transitions (`--budget`)",
-                effort.believed()
-            ),
             Self::Entered => "a coordinator could not be entered".to_owned(),
             Self::Clocked => "when times that count from the beginning of the coordinator (`e_at`) are over was not followed: at once, each time \
                               that such a state is entered late, or later than there is time for (`e_after` counts from the state)"

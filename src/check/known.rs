@@ -1,7 +1,6 @@
 //! What is known of the subsystems of the deployment that is followed.
 
 use super::belief::{Beliefs, MOST_UNTAKEN};
-use super::bound::Bound;
 use super::effort::Left;
 use super::neighbours::{Neighbours, accepted};
 use super::product::Product;
@@ -52,16 +51,9 @@ impl<'a> Product<'a> {
         known.any(|beliefs| beliefs.most_untaken() < MOST_UNTAKEN)
     }
 
-    /// Less is known of them from now on: that each takes an event before the next one comes; then nothing, so that they may tell anything in any
-    /// order. Answers what is left out by that.
-    pub(super) fn know_less(&mut self, around: &Neighbours) -> Bound {
-        let most = self.children.iter().filter_map(|child| child.beliefs.as_ref().map(Beliefs::most_untaken)).max();
-        if most > Some(1) {
-            self.stands_in(around, 1);
-            return Bound::Untaken;
-        }
+    /// From now on they may tell anything in any order.
+    pub(super) fn forget_children(&mut self) {
         self.children.iter_mut().for_each(|child| child.beliefs = None);
-        Bound::Forgotten
     }
 
     /// How much is followed while what is known of subsystems makes more of it.

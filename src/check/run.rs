@@ -18,7 +18,7 @@ use super::{
     monitors as watched, paths, purity, safety, settings, simulated, slips, types, unasked, undriven, unhandled,
     universe, unwatched, ways,
 };
-use crate::model::codes::{CLASH, POST_ON_DESTROYED, PRE_ON_CREATED, TOUCHES_DESTROYED};
+use crate::model::codes::{CLASH, COORD_NO_WAY_DOWN, POST_ON_DESTROYED, PRE_ON_CREATED, TOUCHES_DESTROYED};
 use crate::model::{
     Catalogue, Code, ConfigId, Deployment, EventName, Finding, Findings, MemberRef, Severity, StepFault,
 };
@@ -212,7 +212,7 @@ fn follow(
         }
         let product = apart.as_mut().unwrap_or(&mut product);
         let mut deeper = Deeper::new(product);
-        let mut known_less = None;
+        let mut forgotten = false;
         loop {
             product.follow_anew();
             product.effort = product.most_believed();
@@ -220,10 +220,22 @@ fn follow(
             if !deeper.goes_back(&mut graph) {
                 continue;
             }
-            if graph.product.knows_children() && graph.is_used_up() {
-                // With all that is known of them there is too much of it.
-                known_less = Some(graph.product.know_less(around));
+            if graph.product.knows_children() && graph.is_used_up() && !graph.product.knows_less() {
+                // With all that is known of them there is too much of it: with less it may still be found that something was told in vain.
+                graph.product.stands_in(around, 1);
                 graph.product.follow_with(effort);
+                continue;
+            }
+            if graph.product.knows_less() {
+                if !graph.is_used_up() {
+                    let certain = |(finding, _): &(Finding, _)| {
+                        finding.code == COORD_NO_WAY_DOWN && finding.severity > Severity::Info
+                    };
+                    found.extend(graph.judge().into_iter().filter(certain));
+                }
+                graph.product.forget_children();
+                graph.product.follow_with(effort);
+                forgotten = true;
                 continue;
             }
             if deeper.goes_on(&mut graph) {
@@ -235,11 +247,8 @@ fn follow(
             if graph.product.elsewhere.is_some() {
                 graph.cut(Bound::Elsewhere, Failed::Nothing);
             }
-            if let Some(less) = known_less {
-                graph.cut(less, Failed::Nothing);
-            }
-            if graph.product.knows_no_order() && known_less != Some(Bound::Forgotten) {
-                graph.cut(Bound::Told, Failed::Nothing);
+            if graph.product.knows_no_order() {
+                graph.cut(if forgotten { Bound::Forgotten } else { Bound::Told }, Failed::Nothing);
             }
             if graph.product.waits_for_others() {
                 graph.cut(Bound::Anew, Failed::Nothing);

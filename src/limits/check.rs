@@ -5,8 +5,8 @@
 pub const CHECK_TRANSITIONS: usize = 800_000;
 
 /// Events and answers that are followed of a parent with all that is known of the order in which its subsystems tell things, or three of eight of
-/// `--budget`. Where there are more it is followed with subsystems that take an event before the next one comes, and where that is too much, with
-/// subsystems that may tell anything in any order: that has fewer states, and may refuse too much.
+/// `--budget`. Where there are more it is followed with subsystems that may tell anything in any order: that has fewer states, and may refuse too much;
+/// and before that with subsystems that take an event before the next one comes, only to see what is told where nobody waits for it.
 pub const CHECK_BELIEVED: usize = 300_000;
 
 /// States of a subsystem, each as often as it differs in what its parent was told and in what has failed, up to which an interface automaton is
