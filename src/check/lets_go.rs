@@ -60,12 +60,13 @@ fn taken_back<'c>(
 /// What moves when the first one, which is not safe, is taken back: an operation. Whether a run state is taken back depends on where it is applied.
 fn moves_back(first: &Configuration, second: &Configuration, universe: &Universe) -> Option<Kept> {
     let (operation, by, at) = taken_back(first, second, universe).find(|(_, by, _)| universe.moves(*by))?;
-    Some(Kept {
-        at,
-        does: "calls it".to_owned(),
-        back: format!("`{by}` moves, and takes `{operation}` back"),
-        keep: format!("call `{operation}` too: it then stays"),
-    })
+    // What moves itself is nothing to call in an emergency.
+    let keep = if universe.moves(operation) {
+        String::new()
+    } else {
+        format!("; or let it call `{operation}` too: it then stays")
+    };
+    Some(Kept { at, does: "calls it".to_owned(), back: format!("`{by}` moves, and takes `{operation}` back"), keep })
 }
 
 /// What the first one has made safe, and the second one does nothing about.
@@ -128,8 +129,7 @@ fn moving(first: &Configuration, second: &Configuration, kept: &Kept) -> Finding
         .also(kept.at, format!("`{}` {} here", first.id, kept.does))
         .path(format!("configurations.{}.group", second.id))
         .help(format!(
-            "give `{}` a group of its own: it is then in force over `{}`, and what moves is taken back where `{}` is asked for, in a later step; or let \
-             it {}",
+            "give `{}` a group of its own: it is then in force over `{}`, and what moves is taken back where `{}` is asked for, in a later step{}",
             second.id,
             first.id,
             Ask::UndoOf(first.id),
