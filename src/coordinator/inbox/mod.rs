@@ -9,7 +9,7 @@
 //!    each event that the chart waits for: the last of a name is never lost. The others are lost and counted.
 //! 3. Events from outside. When their room is full they are refused to whoever sends them. None of them is taken up while
 //!    [`limits::INBOX_ASKED`] requests of the coordinator are not answered: it would only ask for more. Those that wait when a safety event
-//!    comes are overtaken by it, and delivered to nobody.
+//!    comes from outside are overtaken by it, and delivered to nobody.
 //!
 //! The first class goes first, after [`limits::INBOX_ROW`] in a row one of the other two; between these what came first, and
 //! after as many in a row of one class the other. Of the first class, after as many urgent ones a word. Which goes first is, but
@@ -56,21 +56,25 @@ pub struct Incoming {
     pub ticket: u64,
     /// Of an urgent one that waits already: it waits where it came last, behind what came between.
     pub last: bool,
-    /// Of one from outside: an event of safety came since. Who raised it could not know of that, and the last word is the other one's.
+    /// Of an event of safety from outside: what waits from outside is overtaken. One that a component or a coordinator raises, perhaps in each of its
+    /// cycles, keeps nobody outside from being heard.
+    pub overtakes: bool,
+    /// Of one from outside: such an event came since. Who raised it could not know of that, and the last word is the other one's.
     pub overtaken: bool,
 }
 
 impl Incoming {
     /// An event of a class, for nobody in particular.
     pub fn new(class: Class, event: EventName) -> Self {
-        Self { event, tag: None, class, ticket: 0, last: false, overtaken: false }
+        Self { event, tag: None, class, ticket: 0, last: false, overtakes: false, overtaken: false }
     }
 
     /// The same, going before others as its precedence says.
     #[must_use]
     pub fn going(self, precedence: Precedence) -> Self {
         let class = if precedence.is_urgent() { Class::Urgent } else { self.class };
-        Self { class, last: precedence == Precedence::UrgentAsLast, ..self }
+        let overtakes = precedence == Precedence::Urgent && self.class == Class::Outside;
+        Self { class, last: precedence == Precedence::UrgentAsLast, overtakes, ..self }
     }
 
     /// The same, for whoever asked.
@@ -266,7 +270,7 @@ impl Inbox {
     }
 
     fn push_urgent(&mut self, incoming: Incoming) -> Result<Put, NotAccepted> {
-        if !incoming.last {
+        if incoming.overtakes {
             self.lists.for_each_mut(List::Outside, |waits| waits.overtaken = true);
         }
         let single = (List::Urgent, incoming.event, None);
