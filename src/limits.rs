@@ -290,6 +290,9 @@ pub const OBSERVE_EVERY: Duration = Duration::from_secs(5);
 /// configuration that comes more often than that is not a repair's to wait for.
 pub const LOOKS_AGAIN: usize = 4;
 
+/// So many lines of the log are looked through for what a recovery has done: what else happens in its seconds fits beside that.
+pub const RECOVERY_LOOKS_BACK: usize = 1000;
+
 /// Components looked at in one call then; a larger system is looked at in several, so that no step waits for long while a
 /// platform reads.
 pub const OBSERVED_AT_ONCE: usize = 256;

@@ -7,6 +7,7 @@ use super::explore::Graph;
 use super::judge::Traced;
 use super::members::Member;
 use super::product::Product;
+use super::reactions::triggers;
 use super::state::{Failed, Move, ProductState};
 use super::uncertain::fails;
 use crate::model::codes::{COORD_LEFTOVERS, COORD_NO_WAY_DOWN};
@@ -317,6 +318,10 @@ impl Graph<'_, '_> {
             return None;
         }
         let chart = &self.product.members[0].chart;
+        // A transition that leads back to where it comes from has heard it.
+        if triggers(chart, then).0.contains(&chart.event(event)) {
+            return None;
+        }
         let (lost, place) = (chart.fqn(then), chart.fqn(now));
         let message = format!(
             "no transition waits for `{event}` in `{lost}`: what comes after leads to `{place}`, and from there only a second one leads down"

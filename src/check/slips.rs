@@ -128,8 +128,9 @@ impl<'a> KnownEvents<'a> {
         if self.declared.contains(&event) || self.told.contains(&event) || listed > 1 {
             return None;
         }
+        let safety = || self.deployment.safety.iter().map(|(event, _)| event.as_str());
         let known = [&self.raised, &self.by_components, &self.accepted].into_iter().flatten();
-        let near = nearest(text, known.copied().chain([DONE]))?;
+        let near = nearest(text, known.copied().chain(safety()).chain([DONE]))?;
         if near == DONE {
             let message = format!("`{event}` is nearly `{DONE}`, which says that what is in a state is done");
             let help = format!("did you mean `{DONE}`? if not, a component or an operator must raise `{event}`");
@@ -139,7 +140,8 @@ impl<'a> KnownEvents<'a> {
         }
         // Of what nobody hears it is said where it is raised, with what may have been meant; but a component's type is another file's.
         let is_heard = self.waited_for.iter().any(|event| event.as_str() == near);
-        if !is_heard && !self.confirms.contains(near) && !self.by_components.contains(near) {
+        let is_safety = safety().any(|event| event == near);
+        if !is_heard && !is_safety && !self.confirms.contains(near) && !self.by_components.contains(near) {
             return None;
         }
         if !is_slip(text, near) {
@@ -148,6 +150,7 @@ impl<'a> KnownEvents<'a> {
         let by = match (self.raised.contains(near), self.by_components.contains(near)) {
             (true, _) => "the deployment raises",
             (false, true) => "a component raises",
+            _ if is_safety => "`safety` lists",
             (false, false) => "the deployment accepts",
         };
         let finding = Finding::warning(COORD_NEAR_EVENT, format!("`{event}` is nearly `{near}`, which {by}"));

@@ -214,6 +214,7 @@ impl<'a> Worlds<'a> {
             places: &[],
             joined: false,
             placed: false,
+            rested: false,
             led: None,
             pushes: None,
         }

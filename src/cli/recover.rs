@@ -59,7 +59,12 @@ impl Run for Args {
         }
         let name = out.paint(Style::Bold, client.name());
         match (whole, answer["was_broken"] == true) {
-            (true, true) => out.line(format!("{name}: {}", out.paint(Style::Good, "recovered"))),
+            (true, true) => {
+                out.line(format!("{name}: {}", out.paint(Style::Good, "recovered")));
+                for step in answer["steps"].as_array().into_iter().flatten() {
+                    out.line(format!("  {} ({})", text(&step["step"]), text(&step["outcome"])));
+                }
+            }
             (true, false) => out.line(format!("{name}: not broken, nothing to recover")),
             (false, _) => {
                 let still = out.paint(Style::Bad, "still broken");

@@ -6,7 +6,7 @@ use super::output::{Output, Style, Table};
 use super::status::{not_known, state_style, text};
 use crate::model::finding::count;
 use crate::session::StoppingView;
-use serde_json::Value as Json;
+use serde_json::{Value as Json, json};
 
 /// Prints it; what is deeper than `depth` in a line each.
 pub fn print(out: &Output, status: &Json, depth: Option<usize>) {
@@ -103,7 +103,12 @@ fn own(out: &Output, status: &Json, part: &FilePart<'_>, known: bool) -> String 
     }
     titled(out, &mut said, "components", &components(out, part, true));
     if !part.residual.is_empty() {
-        let residual: Vec<Json> = part.residual.iter().copied().cloned().collect();
+        // Not what is to be done: what has happened to it.
+        let told = |one: &Json| match text(&one["how"]) {
+            "differs" => json!({ "text": format!("{} (as the platform shows it)", text(&one["text"])) }),
+            _ => one.clone(),
+        };
+        let residual: Vec<Json> = part.residual.iter().map(|one| told(one)).collect();
         said += &format!("{}\n{}", out.paint(Style::Bad, "what remains of what broke it"), listed(&residual));
     }
     said + &faults(out, part)

@@ -168,7 +168,7 @@ impl Engine {
         };
         let mut losers: Vec<Arc<Frame>> = Vec::new();
         for step in steps.iter().filter(differs) {
-            if let Some(frame) = self.wrote(step)
+            if let Some(frame) = self.wrote(step, |_| true)
                 && losers.iter().all(|known| known.configuration != frame.configuration)
             {
                 losers.push(frame);
@@ -201,8 +201,8 @@ impl Engine {
         true
     }
 
-    /// The newest frame that wrote what a step would change.
-    fn wrote(&self, step: &Step) -> Option<Arc<Frame>> {
+    /// The newest of some frames that wrote what a step would change.
+    pub(super) fn wrote(&self, step: &Step, of: impl Fn(&Frame) -> bool) -> Option<Arc<Frame>> {
         let slots = touches(step, None, &self.world.system);
         let writes = |footprint: &Footprint| {
             let mut own = footprint.touches.iter().filter(|touch| touch.access != Access::Need);
@@ -210,7 +210,8 @@ impl Engine {
                 slots.iter().filter(|touch| touch.access != Access::Need).any(|touch| same(own.slot, touch.slot))
             })
         };
-        self.world.stack.frames().iter().rev().find(|frame| writes(&frame.footprint)).cloned()
+        let mut frames = self.world.stack.frames().iter().rev();
+        frames.find(|frame| of(frame) && writes(&frame.footprint)).cloned()
     }
 }
 

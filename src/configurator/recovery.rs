@@ -160,7 +160,7 @@ impl Engine {
             if let Some(at) = self.world.broken.len().checked_sub(1) {
                 match self.partial_of(at) {
                     Some(frame) if !frame.safe && self.read_broken(at) && self.take_back_straight(at, &frame)? => {}
-                    _ => self.repair(at, By::Recovery)?,
+                    _ => _ = self.repair(at, By::Recovery)?,
                 }
                 continue;
             }

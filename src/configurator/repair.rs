@@ -16,13 +16,22 @@ use crate::transaction::{BrokenPart, PartEnd, Spec, Transaction};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
+/// What came of repairing something.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Repaired {
+    /// It is as the model has it.
+    Whole,
+    /// But for what would move: an undo has not asked for that. It is broken still.
+    Rests,
+}
+
 /// Who has something repaired.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum By {
     /// An operator who recovers, without force.
     Recovery,
-    /// The request of a batch under way, by that number: the undo of what broke it.
-    Request(u32),
+    /// The request of a batch under way, by that number: the undo of what broke it. `moving`: it does not go without what moves.
+    Request { number: u32, moving: bool },
     /// Nobody: a component came back.
     Nobody,
 }
@@ -41,28 +50,38 @@ impl Engine {
         }
     }
 
-    /// Mends what a request is about to undo. False: it was answered, since that does not go.
-    pub(super) fn repair_for(&mut self, number: u32, at: usize) -> bool {
-        let Some(request) = self.desk.active(number).map(|active| active.batch.requests[0]) else { return false };
-        match self.repair(at, By::Request(number)) {
-            Ok(()) => true,
+    /// Mends what a request is about to undo. None: it was answered, since that does not go.
+    pub(super) fn repair_for(&mut self, (number, moving): (u32, bool), at: usize) -> Option<Repaired> {
+        let request = self.desk.active(number).map(|active| active.batch.requests[0])?;
+        match self.repair(at, By::Request { number, moving }) {
+            Ok(repaired) => Some(repaired),
             Err(residual) => {
                 let held = self.held_frames();
                 self.world.stays(&request, &held);
                 self.answer(request, Verdict::UndoBroken, Some(Reason::Broken(residual)));
-                false
+                None
             }
         }
     }
 
-    /// What is repaired in one net with its undo is broken no more when that is done, and where that has left something, it
-    /// is told by that. Where nothing of it was done it is broken as before.
-    pub(super) fn mended(&mut self, group: &Group, mut parts: Vec<PartEnd>, interrupted: bool) -> Vec<PartEnd> {
-        let Some(of) = &group.mends else { return parts };
-        match parts.first_mut() {
-            Some(PartEnd::Done | PartEnd::Broken(_)) => self.forget_broken(of),
-            Some(part @ PartEnd::Failed(_)) if !interrupted => {
-                let Some(at) = self.place_of(of) else { return parts };
+    /// What is repaired in one net with its undo is broken no more when that is done, but for what would have moved, and where that has
+    /// left something, it is told by that. Where nothing of it was done it is broken as before.
+    pub(super) fn mended(&mut self, group: &mut Group, mut parts: Vec<PartEnd>, interrupted: bool) -> Vec<PartEnd> {
+        let Some(of) = group.mends.clone() else { return parts };
+        let Some(at) = self.place_of(&of) else { return parts };
+        match (parts.first_mut(), &group.left) {
+            (Some(PartEnd::Done), Some(_)) => {}
+            (Some(PartEnd::Broken(part)), Some(_)) if part.residual.is_settled() => {}
+            (Some(PartEnd::Broken(part)), Some(_)) => {
+                group.left = None;
+                self.world.breaks_beside(at, &mut part.expected);
+                if self.world.broken[at].components.is_empty() {
+                    self.forget_broken(&of);
+                }
+            }
+            (Some(PartEnd::Done | PartEnd::Broken(_)), None) => self.forget_broken(&of),
+            (Some(part @ PartEnd::Failed(_)), _) if !interrupted => {
+                group.left = None;
                 if let (Some(cause), broken) = (part.reason(), &self.world.broken[at]) {
                     let difference = system::diff(&self.world.as_meant(broken), &self.world.system);
                     let residual = Arc::new(Residual { cause, difference, ..(*broken.residual).clone() });
@@ -78,14 +97,57 @@ impl Engine {
                     }));
                 }
             }
-            _ => {}
+            _ => group.left = None,
         }
         parts
+    }
+
+    /// An undo is done beside what is broken, of which this is expected now. What is left of it, since it would move, is about the frame in
+    /// force that had moved it: that is lost.
+    pub(super) fn leave(&mut self, of: &Arc<Residual>, expected: Snapshot) {
+        let Some(at) = self.place_of(of) else { return };
+        let Some(mend) = self.world.is_left(at, expected) else {
+            let residual = self.world.broken[at].residual.clone();
+            return self.forget_broken(&residual);
+        };
+        // What is safe has not moved it: it is undone beside what is broken.
+        let owner = mend.iter().find_map(|step| self.wrote(step, |frame| !frame.safe));
+        self.world.is_about(at, owner.as_deref());
+        self.changed();
+        let residual = &self.world.broken[at].residual;
+        if let Some(owner) = owner {
+            self.lose(owner.configuration, residual.cause.clone());
+        }
+    }
+
+    /// Looks once more at something broken that somebody is about to be refused for: where it has become as the model has it, by what was undone
+    /// or written since, it is broken no more. Nothing is done for that, and what nobody knows stays so.
+    pub(super) fn is_right_again(&mut self, of: &Arc<Residual>) -> bool {
+        if !of.unsettled.is_empty() {
+            return false;
+        }
+        let Some(at) = self.place_of(of) else { return false };
+        if !self.read_broken(at) {
+            return false;
+        }
+        let Some(broken) = self.place_of(of).map(|at| &self.world.broken[at]) else { return false };
+        let (meant, frame) = (self.world.as_meant(broken), broken.frame);
+        if !system::diff::reached(&self.world.system, &meant) || self.world.is_hidden(broken) {
+            return false;
+        }
+        self.forget_broken(of);
+        self.drop_empty(frame);
+        true
     }
 
     pub(super) fn forget_broken(&mut self, of: &Arc<Residual>) {
         if let Some(at) = self.place_of(of) {
             let broken = self.world.broken.remove(at);
+            for step in &broken.residual.difference {
+                if let Some(frame) = self.wrote(step, |_| true) {
+                    self.is_found_again(frame.configuration);
+                }
+            }
             self.world.hand_meant(&broken);
         }
         self.changed();
@@ -93,7 +155,7 @@ impl Engine {
 
     /// The request that something is repaired for; one that a safe configuration has overtaken is marked since.
     fn request_of(&self, by: By) -> Option<&Request> {
-        let By::Request(number) = by else { return None };
+        let By::Request { number, .. } = by else { return None };
         self.desk.active(number).and_then(|active| active.batch.requests.first())
     }
 
@@ -103,9 +165,9 @@ impl Engine {
         let components = components.iter().copied();
         match by {
             By::Recovery => !components.into_iter().any(|component| self.world.stack.keeper_of(component).is_some()),
-            By::Request(_) => self
-                .request_of(by)
-                .is_some_and(|request| request.why == Why::Asked && !keeps_still(&self.world, request, components)),
+            By::Request { moving, .. } => self.request_of(by).is_some_and(|request| {
+                moving && request.why == Why::Asked && !keeps_still(&self.world, request, components)
+            }),
             By::Nobody => false,
         }
     }
@@ -117,12 +179,13 @@ impl Engine {
 
     /// Brings what is broken to where the model has it. What is unsettled is accepted by that. It counts as broken until that is
     /// done: who comes while it is looked and mended plans with it, and who asks is told of it.
-    pub(super) fn repair(&mut self, at: usize, by: By) -> Result<(), Arc<Residual>> {
+    pub(super) fn repair(&mut self, at: usize, by: By) -> Result<Repaired, Arc<Residual>> {
         let serves = self.request_of(by).map_or(RequestId(0), |request| request.id);
         let broken = self.world.broken[at].clone();
         let components: Vec<ComponentName> = broken.components.iter().copied().collect();
         let mut observed = self.read(&components);
         let mut withheld = None;
+        let undone = matches!(by, By::Request { moving: false, .. });
         if observed {
             self.note_quarantine();
             // Made of what is there now: others go on while it is looked.
@@ -130,6 +193,10 @@ impl Engine {
             let hung = |step: &Step| self.world.quarantined.contains(&step.component());
             let steps: Vec<Step> =
                 steps.into_iter().filter(|step| matches!(step, Step::Disconnect { .. }) || !hung(step)).collect();
+            if undone {
+                withheld = steps.iter().find(|step| step::moves(step, &self.world.system)).cloned();
+            }
+            let steps = if undone { self.world.without_moving(steps) } else { steps };
             let moves = system::diff::moves_any(&steps, &self.world.system);
             let touched: Vec<ComponentName> =
                 components.iter().copied().chain(steps.iter().flat_map(touch::components)).collect();
@@ -147,14 +214,12 @@ impl Engine {
         }
         let wanted = self.world.as_meant(&broken);
         // A call that is out still may happen yet.
-        let out = || {
-            let out = |step: &Step| self.world.quarantined.contains(&step.component());
-            broken.residual.unsettled.iter().any(out)
-        };
-        if observed && system::diff::reached(&self.world.system, &wanted) && !out() && !self.world.is_hidden(&broken) {
+        let out = |step: &Step| self.world.quarantined.contains(&step.component());
+        let out = broken.residual.unsettled.iter().any(out);
+        if observed && system::diff::reached(&self.world.system, &wanted) && !out && !self.world.is_hidden(&broken) {
             self.forget_broken(&broken.residual);
             self.drop_empty(broken.frame);
-            return Ok(());
+            return Ok(Repaired::Whole);
         }
         let mut faulted: Vec<ComponentName> = Vec::new();
         for node in components.iter().filter_map(|name| self.world.system.component(*name)) {
@@ -172,11 +237,15 @@ impl Engine {
             withheld: withheld.or_else(|| broken.residual.withheld.clone()),
             ..(*broken.residual).clone()
         });
-        if let Some(at) = self.place_of(&broken.residual) {
+        let place = self.place_of(&broken.residual);
+        if let Some(at) = place {
             self.world.broken[at].residual = residual.clone();
         }
         self.changed();
-        Err(residual)
+        match place {
+            Some(at) if undone && observed && !out && self.world.rests(at) => Ok(Repaired::Rests),
+            _ => Err(residual),
+        }
     }
 
     /// A partial frame that holds nothing to take back is gone with what was broken.

@@ -5,6 +5,7 @@ use super::control::FrameView;
 use super::engine::Engine;
 use super::fast::Fared;
 use super::progress::Progress;
+use super::repair::Repaired;
 use super::request::{Reason, Request};
 use super::running::{Purpose, Running};
 use crate::model::{Ask, ConfigId, RequestId, Verdict};
@@ -49,7 +50,7 @@ impl Engine {
 
     /// The rest of a batch under way is taken up.
     fn take_up(&mut self, number: u32) {
-        let mut looked = false;
+        let (mut looked, mut rested) = (false, false);
         // Once it is taken down nothing begins that had not begun: the rest is answered by that.
         while !self.taking_down {
             let Some(active) = self.desk.active(number) else { return };
@@ -71,27 +72,41 @@ impl Engine {
                 places: &places,
                 joined: false,
                 placed: false,
+                rested,
                 led,
                 pushes: None,
             };
             let mut group = take_up(&self.world, &requests, &rules);
             if let Some(at) = group.repairs
-                && !(looked && group.mends.is_some())
+                && (group.hindered || !(rested || looked && group.mends.is_some()))
             {
                 // What it comes to is decided on what is there, and by whether a safe configuration came meanwhile.
-                if !looked {
+                if !looked && !group.hindered {
                     looked = true;
                     if self.read_broken(at) {
                         continue;
                     }
                 }
                 looked = false;
-                if self.repair_for(number, at) {
-                    continue;
+                let moving = std::mem::take(&mut rested);
+                match self.repair_for((number, moving), at) {
+                    Some(Repaired::Whole) => continue,
+                    Some(Repaired::Rests) => {
+                        rested = true;
+                        continue;
+                    }
+                    None => {}
                 }
                 if self.desk.answered(number, 0, None).over {
                     return;
                 }
+                continue;
+            }
+            let still_broken = group.told.iter().find_map(|told| match &told.reason {
+                Some(Reason::StillBroken(left)) => Some(left.clone()),
+                _ => None,
+            });
+            if still_broken.is_some_and(|left| self.is_right_again(&left)) {
                 continue;
             }
             if group.down {
@@ -110,6 +125,7 @@ impl Engine {
             }
             let Some(planned) = group.planned.take() else {
                 self.book(number, group, Vec::new(), None);
+                rested = false;
                 if self.desk.under_way().iter().all(|active| active.number != number) {
                     return;
                 }
@@ -187,11 +203,11 @@ impl Engine {
     }
 
     /// Books what came of a group of requests and answers them, in the order of the batch.
-    fn book(&mut self, number: u32, group: Group, parts: Vec<PartEnd>, carried: Option<Carried<'_>>) {
+    fn book(&mut self, number: u32, mut group: Group, parts: Vec<PartEnd>, carried: Option<Carried<'_>>) {
         let Some(active) = self.desk.active(number) else { return };
         let requests = active.batch.requests.clone();
         let busy = self.held_frames();
-        let parts = self.mended(&group, parts, carried.as_ref().is_some_and(|carried| carried.reason.is_some()));
+        let parts = self.mended(&mut group, parts, carried.as_ref().is_some_and(|carried| carried.reason.is_some()));
         let endings: Endings = parts.iter().map(PartEnd::ending).collect();
         let interrupted = carried.as_ref().and_then(|carried| carried.reason.clone());
         let stopped = match &interrupted {
@@ -205,14 +221,23 @@ impl Engine {
         if let Some(Carried { planned, stood, since, .. }) = carried {
             let edits = planned.parts.iter().map(|part| &part.edits);
             let pushed = self.world.take_over(edits, &endings, &busy);
+            if let (Some(of), Some(left)) = (&group.mends, group.left.take()) {
+                self.leave(of, left);
+            }
             for (part, ended) in parts.into_iter().enumerate() {
                 let request = requests[group.places[part]];
                 let with = &planned.parts[part].along;
                 let took = || Reason::TookAlong(with.iter().map(|along| TakenAlong::of(&along.frame)).collect());
-                let undid = planned.parts[part].frame.as_ref().filter(|_| request.ask == Ask::Undo);
-                reasons.push(match (&ended, undid) {
-                    (PartEnd::Done, _) if !with.is_empty() => Some(took()),
-                    (PartEnd::Done, Some(frame)) => Some(Reason::Undid(frame.configuration)),
+                let popped = |frame: &&Arc<Frame>| planned.parts[part].edits.pops.iter().any(|(id, _)| *id == frame.id);
+                let undid: Vec<ConfigId> = match request.ask {
+                    Ask::Undo | Ask::UndoTo(_) => {
+                        planned.popped.iter().filter(popped).map(|f| f.configuration).collect()
+                    }
+                    _ => Vec::new(),
+                };
+                reasons.push(match &ended {
+                    PartEnd::Done if !with.is_empty() => Some(took()),
+                    PartEnd::Done if !undid.is_empty() => Some(Reason::Undid(undid)),
                     _ => ended.reason(),
                 });
                 let stood = stood.iter().find(|(of, _)| *of == part).map(|(_, number)| *number);

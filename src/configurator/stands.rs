@@ -216,6 +216,15 @@ impl Engine {
         }
     }
 
+    /// What a configuration had done, and was not there any more, is so again. What it stands for is not watched before it is applied anew.
+    pub(super) fn is_found_again(&mut self, id: ConfigId) {
+        let stands = self.given.configurations.get(&id).is_some_and(|configuration| configuration.holds.is_some());
+        if self.is_lost(id) && !stands {
+            self.forget_standing(id);
+            self.changed();
+        }
+    }
+
     /// Whether a transaction applies, undoes or replaces a configuration, or stops or destroys what it looks at.
     fn works_on(&self, running: &Running, id: ConfigId) -> bool {
         let planned = running.machine.planned();

@@ -780,6 +780,10 @@ codes! {
         "While a frame of a `safe` configuration is in force nothing moves, except by a request that the coordinator raises in \
          a later step: an undo raised in the same step as the safe configuration is refused when a step of it moves, and so \
          is an operator's request without `--force`. Nothing was done.";
+    OVERWRITES_SAFE = "run::overwrites_safe", "an operator would overwrite what something safe has written",
+        "While a frame of a `safe` configuration is in force, what it has written, and its place in its group, is changed by an operator \
+         only with `--force`, also what `operator:` lists: whoever looks at it takes it for held. What a coordinator asks for in a later step \
+         goes. Nothing was done.";
     MOVES_UNASKED = "run::moves_unasked", "something would move that nobody asked to move",
         "A confirmation did not come in time, and taking the configuration back would move hardware. Nobody asked for that: the \
          frame stays, the answer is `ID.undo.failed`. `on_failure = \"rollback\"` in the configuration lets it move.";

@@ -36,7 +36,8 @@ impl Session {
         let replaced = before.0.iter().filter(of_group).filter(gone).filter_map(|frame| match frame.by {
             Requester::Coordinator(name) => {
                 let was = frame.configuration;
-                Some(format!("it is in the place of `{was}` of `{name}`, which an undo does not bring back: `davit apply {was}` does"))
+                let force = if deployment.operator_applies().any(|listed| listed == was) { "" } else { " --force" };
+                Some(format!("it is in the place of `{was}` of `{name}`, which an undo does not bring back: `davit apply {was}{force}` does"))
             }
             _ => None,
         });

@@ -1,11 +1,13 @@
 //! The way out of *broken* (semantics: *What goes wrong*): what differs from what should be, going back, taking what is there.
 
 use super::Session;
-use super::log::Happening;
+use super::log::{Happening, LogEntry, StepTime};
 use crate::configurator::{ConfiguratorView, Drift, Recovery, Residual};
+use crate::limits;
 use crate::model::{ComponentName, Step};
 use serde::Serialize;
 use std::fmt;
+use std::sync::Arc;
 use std::time::Duration;
 
 /// One thing that is not as it should be: `{"how": "differs", "do": "property_set", "target": "a.k", "value": 2.0,
@@ -131,6 +133,8 @@ pub struct Recovered {
     pub why: Option<String>,
     /// What remains; empty when it is whole.
     pub residual: Vec<Difference>,
+    /// What was done for it.
+    pub steps: Vec<StepTime>,
 }
 
 /// The word of a recovery, as it is typed.
@@ -154,7 +158,8 @@ impl Session {
     pub fn recover(&self, how: Recovery, by: &str, within: Duration) -> Option<Recovered> {
         let deadline = self.clock().now() + within;
         let was_broken = self.configurator().view(false, deadline)?.broken.is_some();
-        self.hub().note(Happening::Requested { request: None, ask: format!("recover --{how}"), by: by.to_owned() });
+        let asked = Happening::Requested { request: None, ask: format!("recover --{how}"), by: by.to_owned() };
+        self.hub().note(asked.clone());
         let ended = self.configurator().recover(how, deadline)?;
         self.refresh_phase();
         // Or it was found to be when it was looked at.
@@ -168,7 +173,19 @@ impl Session {
             was_broken,
             why: residual.as_ref().map(|residual| residual.why()),
             residual: residual.map(|residual| Difference::of_residual(&residual)).unwrap_or_default(),
+            steps: self.steps_since(&asked),
         })
+    }
+
+    /// What was done to mend something since that was written down.
+    fn steps_since(&self, asked: &Happening) -> Vec<StepTime> {
+        let log = self.hub().log(limits::RECOVERY_LOOKS_BACK);
+        let since = log.iter().rposition(|entry| entry.what == *asked).unwrap_or(log.len());
+        let of = |entry: &Arc<LogEntry>| match &entry.what {
+            Happening::Recovered { steps } => steps.clone(),
+            _ => Vec::new(),
+        };
+        log[since..].iter().flat_map(of).collect()
     }
 }
 

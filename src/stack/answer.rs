@@ -93,6 +93,10 @@ pub enum Reason {
         /// What keeps it still.
         safe: ConfigId,
     },
+    /// An operator would write what a `safe` configuration in force has written.
+    OverwritesSafe(Step, ConfigId),
+    /// An operator's would take the place of a `safe` configuration in force.
+    TakesSafePlace(ConfigId),
     /// Something would move that nobody asked to move.
     MovesUnasked(Step),
     /// What it needs is being worked on.
@@ -120,7 +124,7 @@ pub enum Reason {
     /// It was to be undone, and had no frame.
     NotInForce(ConfigId),
     /// What an undo without a name has undone.
-    Undid(ConfigId),
+    Undid(Vec<ConfigId>),
     /// It was undone, and these frames with it, which stood in its way.
     TookAlong(Vec<TakenAlong>),
     /// Everything is being taken down.
@@ -301,6 +305,12 @@ impl Reason {
             Self::Moves(..) | Self::KeptStill { .. } => Finding::error(codes::MOVES_WHILE_SAFE, self.to_string()).help(
                 "let the coordinator ask for it in a later step, when it is meant to move again; an operator says `--force`",
             ),
+            Self::OverwritesSafe(_, safe) | Self::TakesSafePlace(safe) => {
+                Finding::error(codes::OVERWRITES_SAFE, self.to_string()).help(format!(
+                    "`{safe}` is let go of by its own undo, as its coordinator does it (`davit undo {safe}`, with `--force` where a \
+                     coordinator asked for it); `--force` does it all the same"
+                ))
+            }
             Self::MovesUnasked(_) => Finding::error(codes::MOVES_UNASKED, self.to_string()).help(
                 "undo it when it may move, or write `on_failure = \"rollback\"` where it always may",
             ),
@@ -366,6 +376,12 @@ impl fmt::Display for Reason {
                 "`{step}` moves, and the safe configuration `{safe}` is in force: `davit undo {safe}` lets it go (with `--force` where a \
                  coordinator asked for it), and `davit recover --back` goes on then; `davit undo {frame} --force` moves it all the same"
             ),
+            Self::OverwritesSafe(step, safe) => {
+                write!(f, "`{step}` changes what the safe configuration `{safe}`, which is in force, has written")
+            }
+            Self::TakesSafePlace(safe) => {
+                write!(f, "it would take the place of the safe configuration `{safe}`, which is in force")
+            }
             Self::MovesUnasked(step) => write!(f, "`{step}` moves, and nobody asked for that"),
             Self::Busy => f.write_str("requests are under way that it would meddle with"),
             Self::NeedsForce(id) => {
@@ -389,7 +405,10 @@ impl fmt::Display for Reason {
             ),
             Self::NothingAbove(left) => write!(f, "there is nothing to undo: no more is in force than {}", count(left, "frame")),
             Self::NotInForce(id) => write!(f, "`{id}` was not in force: there was nothing to undo"),
-            Self::Undid(id) => write!(f, "`{id}` is undone"),
+            Self::Undid(all) => {
+                let names: Vec<String> = all.iter().map(|id| format!("`{id}`")).collect();
+                write!(f, "{} {} undone", names.join(", "), if all.len() == 1 { "is" } else { "are" })
+            }
             Self::TookAlong(frames) => {
                 let of = |left: bool, whose: &str| {
                     let ids = frames.iter().filter(|frame| frame.left == left);

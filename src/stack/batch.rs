@@ -5,14 +5,15 @@
 //! fails, those before it stand, and those behind it are taken up anew. A request that is refused by itself is answered and
 //! left out, and the rest is planned anew.
 
+use super::keep::{keeps_still, overwrites_safe};
 use super::leave::along;
+use super::still::Beside;
 use super::work::{Op, Planned, Room, Work};
 use super::{
-    FrameId, LedDown, Pile, PushesOf, Reason, Request, Requester, Residual, Stillness, Why, World, claims, may_commit,
-    share,
+    FrameId, LedDown, Pile, PushesOf, Reason, Request, Requester, Residual, Why, World, claims, may_commit, share,
 };
 
-use crate::model::{Ask, ComponentName, ConfigId, Configuration, Finding, OnFailure, Step, Verdict, codes};
+use crate::model::{Ask, ComponentName, ConfigId, Configuration, Finding, OnFailure, Snapshot, Step, Verdict, codes};
 use crate::plan::replace::neighbours;
 use crate::plan::{PlanContext, PlannedStep, Refusal};
 use crate::system::{Overlay, touch};
@@ -40,6 +41,8 @@ pub struct Rules<'a> {
     pub joined: bool,
     /// Its pushes have taken their place on the stack when they began: what others hold on to since does not matter.
     pub placed: bool,
+    /// What its undo repairs is repaired, as far as nothing has to move for that: what is broken still stays so.
+    pub rested: bool,
     /// It takes along what nobody asks for any more and is in the way of its undos, while this is led down.
     pub led: Option<LedDown>,
     /// What is known of pushes in the system of the world; none: each is planned.
@@ -72,8 +75,12 @@ pub struct Group {
     pub visits: SmallVec<[Option<FrameId>; 2]>,
     /// What is repaired before the plan is carried out, by its place in [`World::broken`].
     pub repairs: Option<usize>,
-    /// That is repaired by the plan itself, in one net with the undo; when it is done, this is broken no more.
+    /// That is repaired by the plan itself, in one net with the undo, or was before it; when it is done, this is broken no more.
     pub mends: Option<Arc<Residual>>,
+    /// But for what would move: what is expected of that then.
+    pub left: Option<Snapshot>,
+    /// It does not go where that has not moved.
+    pub hindered: bool,
     /// The requester's frames are made permanent.
     pub commits: bool,
     /// A coordinator has come to its *down* state.
@@ -104,8 +111,14 @@ pub fn take_up(world: &World, requests: &[Request], rules: &Rules<'_>) -> Group 
         &avoiding
     };
     let mut refused: SmallVec<[Told; 2]> = SmallVec::new();
+    let mut hindered = false;
+    let needs_it = |beside: &Option<(FrameId, SmallVec<[FrameId; 2]>)>| match (repairs, beside) {
+        (Some(at), Some((frame, with))) => world.needs_moving(at, (*frame, with), context),
+        _ => false,
+    };
     'anew: loop {
-        let mut group = Group { takes: together, told: refused.clone(), repairs, ..Group::default() };
+        let mut group = Group { takes: together, told: refused.clone(), repairs, hindered, ..Group::default() };
+        let mut beside: Option<(FrameId, SmallVec<[FrameId; 2]>)> = None;
         let mut view = Overlay::new(&world.system);
         let mut work = Work::new(&mut view, &world.stack).knowing(rules.pushes.filter(|_| whole));
         for (place, request) in requests[..together].iter().enumerate() {
@@ -122,18 +135,23 @@ pub fn take_up(world: &World, requests: &[Request], rules: &Rules<'_>) -> Group 
                     let visit = if let Op::Undo(frame) = &op { Some(*frame).filter(let_go) } else { None };
                     let meant = |(at, frame): (usize, FrameId)| {
                         let with = taken_along(world, &work, request, frame, (rules, true)).ok()?;
-                        let undo = world.undo_as_meant(at, (frame, &with), context).ok()?;
-                        Some((at, world.in_one_net(at, undo)?))
+                        Some((at, world.undo_mended(at, (frame, &with), context)?))
                     };
                     if let (Some(at), Op::Undo(frame)) = (repairs, &op)
-                        && let Some((at, planned)) = meant((at, *frame))
+                        && let Some((at, (planned, left))) = meant((at, *frame))
                     {
                         group.mends = Some(world.broken[at].residual.clone());
+                        group.left = left;
                         group.places.push(place);
                         group.visits.push(visit);
                         return with_plan(world, requests, group, planned, rules);
                     }
+                    if let (true, Op::Undo(frame)) = (rules.rested, &op) {
+                        let with = taken_along(world, &work, request, *frame, (rules, true)).unwrap_or_default();
+                        beside = Some((*frame, with));
+                    }
                     if let Err(refusal) = add(world, &mut work, request, &op, (rules, context), repairs.is_some()) {
+                        hindered = needs_it(&beside);
                         refused.push(no(place, request, Reason::Refused(refusal.findings)));
                         continue 'anew;
                     }
@@ -147,10 +165,23 @@ pub fn take_up(world: &World, requests: &[Request], rules: &Rules<'_>) -> Group 
             match work.finish(&world.system, room) {
                 Err(refusal) => {
                     let place = group.places[refusal.request.min(group.places.len() - 1)];
+                    hindered = needs_it(&beside);
                     refused.push(no(place, &requests[place], Reason::Refused(refusal.findings)));
                     continue 'anew;
                 }
                 Ok(planned) => {
+                    if let (Some(at), Some((frame, with))) = (repairs, &beside) {
+                        let residual = world.broken[at].residual.clone();
+                        match world.beside(at, (*frame, with), &planned, context) {
+                            Beside::Left(left) => (group.mends, group.left) = (Some(residual), Some(left)),
+                            Beside::Hindered => return Group { hindered: true, ..group },
+                            Beside::Barred => {
+                                let place = group.places[0];
+                                refused.push(no(place, &requests[place], Reason::StillBroken(residual)));
+                                continue 'anew;
+                            }
+                        }
+                    }
                     if let Some((part, reason)) = forbidden(world, requests, &group, &planned, rules) {
                         let place = group.places[part];
                         refused.push(no(place, &requests[place], reason));
@@ -392,16 +423,8 @@ fn foreign(frames: &[Arc<super::Frame>], request: &Request) -> Option<ConfigId> 
     if request.force { None } else { frames.iter().find(others).map(|frame| frame.configuration) }
 }
 
-/// Whether these may not move for a request, since a safe configuration of their (sub)system is in force: only for what a
-/// coordinator asks in a later step they may, or for what is forced.
-pub fn keeps_still(world: &World, request: &Request, components: impl IntoIterator<Item = ComponentName>) -> bool {
-    let foreign = request.requester == Requester::Operator || request.why != Why::Asked;
-    let held = || components.into_iter().any(|component| world.stack.keeper_of(component).is_some());
-    request.still != Stillness::No || foreign && !request.force && held()
-}
-
 /// The part of a plan that must not be carried out now, and why: it needs a component in quarantine, or something would
-/// move that nobody may move.
+/// move that nobody may move, or an operator would overwrite what is safe.
 fn forbidden(
     world: &World,
     requests: &[Request],
@@ -425,6 +448,9 @@ fn forbidden(
         let request = &requests[*place];
         let unasked = unasked(part, request);
         let kept = |step: &Step| keeps_still(world, request, touch::components(step));
+        if let Some(reason) = overwrites_safe(world, request, planned, part) {
+            return Some((part, reason));
+        }
         let steps = planned.steps.iter().enumerate();
         let mut own = steps.filter(|(at, _)| planned.part_of(planned.place(*at)) == part);
         if let Some((_, moving)) = own.find(|(_, planned)| planned.moves && (unasked || kept(&planned.step))) {

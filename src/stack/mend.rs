@@ -8,7 +8,7 @@
 use super::net::is_bound;
 use super::squash::list;
 use super::work::{Op, Planned, Work, transaction};
-use super::{Broken, Frame, FrameId, HandOver, Inverse, SafeWrites, World, net};
+use super::{Broken, Frame, FrameId, HandOver, Inverse, SafeWrites, Stack, World, net};
 use crate::model::{ComponentName, MemberRef, Origin, RunState, Snapshot, Step};
 use crate::plan::footprint::{Footprint, Index, Saved, Slot};
 use crate::plan::undo::{DraftStep, Script, absolute};
@@ -32,7 +32,7 @@ impl Broken {
     }
 
     /// The components of which it is known what they are expected to be.
-    fn own(&self) -> Vec<ComponentName> {
+    pub(super) fn own(&self) -> Vec<ComponentName> {
         self.components.difference(&self.guests).copied().collect()
     }
 
@@ -294,37 +294,36 @@ impl World {
         newest.is_some_and(|frame| frame.safe && !broken.goes_by(frame))
     }
 
-    /// The undo of a frame, with those of others that come first, if what is broken at this place were as it is meant.
+    /// The undo of a frame, with those of others that come first, in a picture.
     ///
     /// # Errors
-    /// [`Refusal`]: it is refused then as well.
-    pub(super) fn undo_as_meant(
-        &self,
-        at: usize,
+    /// [`Refusal`]: it is refused there.
+    pub(super) fn undo_in(
+        wanted: &System,
+        stack: &Stack,
         (frame, with): (FrameId, &[FrameId]),
         context: &PlanContext,
     ) -> Result<Planned, Refusal> {
-        let wanted = self.as_meant(&self.broken[at]);
         if with.is_empty() {
-            return transaction(&wanted, &self.stack, &[Op::Undo(frame)], context);
+            return transaction(wanted, stack, &[Op::Undo(frame)], context);
         }
-        let mut view = Overlay::new(&wanted);
-        let mut work = Work::new(&mut view, &self.stack);
+        let mut view = Overlay::new(wanted);
+        let mut work = Work::new(&mut view, stack);
         work.add_undo(frame, with)?;
-        work.finish(&wanted, None)
+        work.finish(wanted, None)
     }
 
     /// The undo of a frame in one net with what mends what is broken at this place. None: there is nothing that would be
     /// mended to be taken back at once, and each goes by itself.
     pub fn straight(&self, at: usize, frame: FrameId, context: &PlanContext) -> Option<Planned> {
-        self.in_one_net(at, self.undo_as_meant(at, (frame, &[]), context).ok()?)
+        let wanted = self.as_meant(&self.broken[at]);
+        self.in_one_net(at, &wanted, Self::undo_in(&wanted, &self.stack, (frame, &[]), context).ok()?)
     }
 
-    /// The same of an undo that is planned as everything is meant.
-    pub(super) fn in_one_net(&self, at: usize, undo: Planned) -> Option<Planned> {
+    /// The same of an undo that is planned in the picture `wanted`, to which is mended.
+    pub(super) fn in_one_net(&self, at: usize, wanted: &System, undo: Planned) -> Option<Planned> {
         let broken = &self.broken[at];
-        let wanted = self.as_meant(broken);
-        let mend = diff(&self.system, &wanted);
+        let mend = diff(&self.system, wanted);
         let out = broken.residual.unsettled.iter().any(|step| self.quarantined.contains(&step.component()));
         if mend.is_empty() || out {
             return None;
@@ -336,7 +335,7 @@ impl World {
         let mends = mend.len();
         let alone = |step| DraftStep::bare(step, PlanStage::Changes, Origin::NONE);
         let items = mend.into_iter().map(alone).chain(undo.steps.iter().map(DraftStep::of)).collect();
-        let shorter = self.spared(items, mends, &wanted);
+        let shorter = self.spared(items, mends, wanted);
         if shorter.iter().filter(|item| (item.of as usize) < mends).count() == mends {
             return None;
         }
@@ -347,7 +346,7 @@ impl World {
             if calls { None } else { self.leads_to(whole, &end) }
         })?;
         let undone = |id: FrameId| undo.popped.iter().any(|popped| popped.id == id);
-        if steps.iter().any(|planned| self.is_safe_ones(&planned.step, &wanted, broken, &undone)) {
+        if steps.iter().any(|planned| self.is_safe_ones(&planned.step, wanted, broken, &undone)) {
             return None;
         }
         let mut parts = undo.parts;
@@ -406,7 +405,7 @@ impl World {
 }
 
 /// Does a step where there is what it begins with; that it may be done now is nothing to ask. False: there is not.
-fn goes_on(step: &Step, system: &mut System) -> bool {
+pub(super) fn goes_on(step: &Step, system: &mut System) -> bool {
     let there = leads_on(step, system);
     match step {
         // With what is connected to it: others may have done that.

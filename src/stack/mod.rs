@@ -15,6 +15,7 @@ pub mod claims;
 pub mod contenders;
 mod desk;
 mod effort;
+mod keep;
 mod leave;
 mod mend;
 mod net;
@@ -27,6 +28,7 @@ mod settle;
 mod share;
 mod squash;
 mod stands;
+mod still;
 #[cfg(test)]
 mod tests;
 mod void;
@@ -34,9 +36,10 @@ mod work;
 mod world;
 
 pub use answer::{Answer, Reason, Residual, TakenAlong};
-pub use batch::{Group, Rules, Told, held, keeps_still, may_apply, take_up};
+pub use batch::{Group, Rules, Told, held, may_apply, take_up};
 pub use desk::{ActiveBatch, Arrival, Arrived, Desk, GivenUp, Gone, given_up_of};
 pub use effort::{BestEffort, effort};
+pub use keep::keeps_still;
 pub use leave::Barring;
 pub use net::reduce;
 pub use permanent::may_commit;

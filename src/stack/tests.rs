@@ -116,6 +116,7 @@ fn taken_up(
         operator: &FxHashSet::default(),
         joined,
         placed: false,
+        rested: false,
         led: None,
         pushes,
     };

@@ -25,6 +25,13 @@ pub fn moves_any(steps: &[Step], system: &System) -> bool {
     })
 }
 
+/// The steps, done one after the other, but for some, and for those that are not possible without these.
+pub fn without(mut steps: Vec<Step>, system: &System, out: impl Fn(&Step, &Overlay<'_>) -> bool) -> Vec<Step> {
+    let mut view = Overlay::new(system);
+    steps.retain(|step| !out(step, &view) && step::apply(step, &mut view).is_ok());
+    steps
+}
+
 /// What is demanded of a component that is to be as one in `state`.
 fn to_want(state: RunState) -> Wanted {
     state.wanted().unwrap_or(Wanted::Unconfigured)

@@ -18,7 +18,7 @@ pub mod touch;
 mod violation;
 
 pub use crate::model::MemberClass;
-pub use diff::{diff, moves_any};
+pub use diff::{diff, moves_any, without};
 pub use node::{ComponentNode, Driven, Link, Written};
 pub use overlay::Overlay;
 pub use picture::Picture;

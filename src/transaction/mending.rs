@@ -4,9 +4,9 @@ use super::back::{WayBack, chain};
 use super::run::StepsRun;
 use super::touched::Touched;
 use super::{Can, Transaction, TransactionPhase};
-use crate::model::{OnFailure, RunState, Snapshot, Step};
+use crate::model::{ComponentName, OnFailure, RunState, Snapshot, Step};
 use crate::system::touch::{Slot, slot};
-use crate::system::{System, View as _, moves_any, step};
+use crate::system::{Overlay, System, View as _, moves_any, step, without};
 use rustc_hash::FxHashSet;
 use std::sync::Arc;
 
@@ -80,6 +80,10 @@ impl Transaction {
                 .into_iter()
                 .filter(|step| matches!(step, Step::Disconnect { .. }) || !can.quarantined.contains(&step.component()))
                 .collect();
+            // Who gives it up, or wants it taken back, has asked for what it has moved, and for nothing else.
+            let own: Vec<ComponentName> = self.forward.moved().collect();
+            let others = |step: &Step, view: &Overlay<'_>| step::moves(step, view) && !own.contains(&step.component());
+            let steps = if asked { without(steps, live, others) } else { steps };
             if !steps.is_empty() && (asked || !moves_any(&steps, live)) {
                 let done = self.forward.done.iter().map(|i| slot(&self.forward.list[*i as usize].step));
                 let done: FxHashSet<Slot> = done.collect();

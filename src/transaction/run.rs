@@ -4,7 +4,7 @@ use super::limits::Limit;
 use super::messages::{CallKind, Can};
 use super::order::Order;
 use crate::limits;
-use crate::model::{Cause, ComponentName, Execution, Finding, Outcome, RunState, Step};
+use crate::model::{Cause, ComponentName, Execution, Finding, Outcome, RunState, Step, Transition};
 use crate::plan::PlannedStep;
 use crate::stack::Reason;
 use crate::system::{System, Undo, View as _, Violation, is_so, step};
@@ -66,6 +66,16 @@ pub(super) struct LateStep {
 }
 
 impl StepsRun {
+    /// Components that it has begun to start, to stop or to destroy: its way back is about what that moves, and about nothing else.
+    pub fn moved(&self) -> impl Iterator<Item = ComponentName> + '_ {
+        let begun = self.list.iter().zip(&self.state).filter(|(_, state)| **state != StepState::Waiting);
+        begun.filter_map(|(planned, _)| match &planned.step {
+            Step::State { component, transition: Transition::Start | Transition::Stop }
+            | Step::Destroy { component } => Some(*component),
+            _ => None,
+        })
+    }
+
     /// With one limit for all steps, or one for each.
     pub fn new(list: Arc<Vec<PlannedStep>>, limits: SmallVec<[Limit; 1]>) -> Self {
         Self {

@@ -53,6 +53,99 @@ fn one_that_fails_in_part_stays_and_is_undone_to_what_is_in_force() {
     assert_eq!(said(&demo, &at_once), ["stopped nil", "reset nil"]);
 }
 
+/// The motor had never started, though the platform had said so: neither the end of the emergency, nor the way down through it, nor who
+/// gives up what is under way has asked for it to start.
+#[test]
+fn letting_go_starts_nothing() {
+    let story = |asks: &str, then: &str| {
+        format!(
+            "fault('start motor', 'lie', 1) deploy('deployment.yaml')
+             {asks}
+             for _, entry in ipairs(log{{ since = now() - 6 }}) do
+               for _, done in ipairs(entry.steps or {{}}) do
+                 if done.step == 'start motor' then say('started by ' .. entry.answer) end
+               end
+             end
+             say(active()[#active()] .. ' ' .. tostring(state('motor')))
+             for _, frame in ipairs(stack()) do if frame.lost then say('lost ' .. frame.configuration) end end
+             for _, one in ipairs(drift()) do say(one.how .. ' ' .. one.text) end
+             {then} raise('e_end') wait(1) say(active()[#active()])"
+        )
+    };
+    let demo = belt();
+    let stop = "fault('operation_call motor.brake', 'lost', 1) raise('e_stop') wait(4)
+                for _, one in ipairs(stack()) do if one.partial then say('in part ' .. one.configuration) end end";
+    let reset = said(&demo, &story(&format!("{stop} raise('e_reset') wait(0.5)"), ""));
+    let left = ["started by run.ok", "root.failed stopped", "lost run", "differs stop motor", "root.off"];
+    assert_eq!((reset[0].as_str(), &reset[1..]), ("in part stop", &left.map(str::to_owned)[..]));
+    let down = said(&demo, &story(&format!("{stop} raise('e_end') wait(0.5)"), ""));
+    assert_eq!(down[1..], ["started by run.ok", "root.off nil", "root.off"].map(str::to_owned));
+    let gives_up = "fault('port_write motor.speed', 'lost', 1) raise('e_faster') wait(0.2) raise('e_slower') wait(4)";
+    let gave_up = said(&demo, &story(gives_up, "recover('back')"));
+    assert_eq!(gave_up[..2], ["started by run.ok", "root.failed stopped"].map(str::to_owned), "{gave_up:?}");
+    assert_eq!(gave_up.last().unwrap(), "root.off", "a recovery mends it, and the way down is free");
+}
+
+/// What something safe in force has written, or its place, is changed by hand only with force, also where it is listed; whoever looks takes it
+/// for held.
+#[test]
+fn what_is_safe_is_overwritten_by_force_only() {
+    let demo = belt();
+    demo.replace("belt/deployment.yaml", "operator: [motor.limit]", "operator: [motor.limit, motor.speed, fast]");
+    let story = "local function tries(what, ask) local ok, why = pcall(ask) say(what .. ' ' .. tostring(port('motor.speed')) .. (ok and '' or ': ' .. tostring(why):match('[^\\n]*$'))) end
+         deploy('deployment.yaml') set('motor.speed', 0.2, { within = 1 }) say(tostring(port('motor.speed')))
+         undo('motor.speed') wait_answer('motor.speed.undone', 1)
+         raise('e_stop') wait_answer('stop.ok', 1)
+         tries('set', function() set('motor.speed', 0.4, { within = 1 }) end)
+         set('motor.limit', 0.3, { within = 1 }) say('beside ' .. property('motor.limit'))
+         apply('fast') wait(0.5) say('apply ' .. tostring(port('motor.speed')))
+         for _, frame in ipairs(stack()) do if frame.configuration == 'stop' then say('stop is there') end end
+         set('motor.speed', 0.4, { within = 1, force = true }) say('forced ' .. port('motor.speed'))
+         undo('motor.speed') wait(0.5) undo('motor.limit') wait(0.5)
+         raise('e_reset') wait(0.5) shutdown()";
+    let told = said(&demo, story);
+    assert_eq!(told.len(), 6, "{told:?}");
+    assert_eq!((&*told[0], &*told[2], &*told[3]), ("0.2", "beside 0.3", "apply 0.0"), "{told:?}");
+    assert!(told[1].starts_with("set 0.0: "), "{told:?}");
+    assert_eq!(told[4..], ["stop is there", "forced 0.4"]);
+    let up = demo.run(&["deploy", "belt/deployment.yaml", "--detach"]);
+    assert_eq!(up.code, 0, "{}{}", up.out, up.err);
+    assert_eq!(demo.run(&["event", "e_stop", "--wait", "stop.ok"]).code, 0);
+    let refused = demo.run(&["set", "motor.speed", "0.4"]);
+    let why =
+        "`port_write motor.speed = 0.4` changes what the safe configuration `stop`, which is in force, has written";
+    assert!(refused.code == 1 && refused.out.contains(why), "{}{}", refused.out, refused.err);
+    let refused = demo.run(&["apply", "fast"]);
+    let why = "it would take the place of the safe configuration `stop`, which is in force";
+    assert!(refused.code == 1 && refused.out.contains(why), "{}{}", refused.out, refused.err);
+    assert_eq!(demo.run(&["shutdown"]).code, 0);
+}
+
+/// A value that the platform had lied about, and that something safe has written since, is right again: nothing stands in the way down.
+#[test]
+fn what_has_become_right_again_stands_in_nobodys_way() {
+    let told = said(
+        &belt(),
+        "deploy('deployment.yaml') fault('port_write motor.speed', 'lie', 1) raise('e_faster') wait(7)
+         assert(stack()[3].lost) raise('e_stop') wait(1) raise('e_end') wait(2) say(active()[#active()])",
+    );
+    assert!(told.last().is_some_and(|last| last == "root.off"), "{told:?}");
+}
+
+/// A slip in the name of a safety event is named where it was made.
+#[test]
+fn a_misspelt_safety_event_is_named() {
+    let demo = belt();
+    demo.replace(
+        "belt/coordinator.yaml",
+        "- { src: failed, tgt: stopped, events: [e_stop] }",
+        "- { src: failed, tgt: stopped, events: [e_stpo] }",
+    );
+    let near = found(&demo, "coord::near_event");
+    assert_eq!(near.len(), 1, "{near:?}");
+    assert_eq!(near[0]["message"], "`e_stpo` is nearly `e_stop`, which `safety` lists");
+}
+
 /// Who lets go of it, and stops it again before that was heard, has it stopped: what comes last counts, though safety is heard first.
 #[test]
 fn a_stop_that_comes_last_is_the_last_word() {

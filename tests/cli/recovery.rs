@@ -122,7 +122,8 @@ fn a_broken_deployment_goes_back() {
 
     std::fs::rename(deployed.0.path("away"), deployed.0.path("logs")).unwrap();
     let back = run(&["recover", "--back"]);
-    assert_eq!((back.code, back.out.as_str()), (0, "logged: recovered\n"), "{}", back.err);
+    let done = "  property_set log.path (done)\n  configure log (done)\n  start log (done)\n";
+    assert_eq!((back.code, back.out), (0, format!("logged: recovered\n{done}")), "{}", back.err);
     let status = deployed.status();
     assert_eq!((&status["phase"], &status["residual"]), (&json!("up"), &json!([])));
     assert_eq!(status["system"]["components"]["log"]["state"], "running");
@@ -333,10 +334,39 @@ fn who_recovers_looks_first() {
          deploy('deployment.yaml') fault('property_set motor.limit', 'lie') set('motor.limit', 0.25) tell('lied')
          recover('back') tell('recovered') undo('motor.limit') wait_answer('motor.limit.undone', 1)
          fault('port_write motor.speed', 'fail', 1) raise('e_stop') wait_state('stopped.in_part', 1)
-         fault('property_set motor.limit', 'lie') set('motor.limit', 0.25) tell('in part')
+         fault('property_set motor.limit', 'lie') set('motor.limit', 0.25, {force = true}) tell('in part')
          local ok, why = pcall(recover, 'back') why = tostring(why) tell('stays')
          assert(not ok and why:find('motor.brake() (done, and not taken back)', 1, true) and not why:find('limit', 1, true), why)",
     );
     let told: Vec<&String> = told.iter().filter(|line| !line.contains("note ")).collect();
     assert_eq!(told, ["lied 0.5 1 0", "recovered 0.25 0 1", "in part 0.0 1 1", "stays 0.25 0 1"]);
+}
+
+/// Who recovers is told what was done for it, and what was lost is so no more when it is there again.
+#[test]
+fn who_recovers_is_told_what_was_done() {
+    let demo = belt();
+    demo.replace(
+        "belt/deployment.yaml",
+        "platform: simulated",
+        "platform: simulated\nfaults: [{ step: start motor, how: lie }]",
+    );
+    let up = demo.run(&["deploy", "belt/deployment.yaml", "--detach"]);
+    assert_eq!(up.code, 0, "{}{}", up.out, up.err);
+    let lost = || {
+        let frames = demo.run(&["stack", "--json"]).json();
+        let frames = frames.as_array().cloned().unwrap_or_default();
+        frames.iter().filter(|f| f["lost"] == true).map(|f| f["configuration"].to_string()).collect::<Vec<_>>()
+    };
+    let recovered = demo.run(&["recover", "--back"]);
+    assert_eq!(
+        (recovered.code, recovered.out.as_str()),
+        (0, "belt: recovered\n  start motor (done)\n"),
+        "{}",
+        recovered.err
+    );
+    assert_eq!(lost(), [""; 0], "it runs again");
+    let undone = demo.run(&["undo", "--to", "1", "--force"]);
+    assert!(undone.code == 0 && undone.out.contains("`slow`, `run` are undone"), "{}{}", undone.out, undone.err);
+    demo.run(&["shutdown", "--force"]);
 }

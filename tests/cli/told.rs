@@ -26,8 +26,7 @@ fn an_operator_hears_whose_frame_goes_and_what_must_be_confirmed() {
     let (demo, deployed) = deployed(&[("configurations.lua", "rename = Configuration {", confirmed)]);
     let fast = demo.run(&["apply", "fast", "--force"]);
     assert_eq!(fast.code, 0, "{}{}", fast.out, fast.err);
-    let told =
-        "note: it is in the place of `slow` of `demo`, which an undo does not bring back: `davit apply slow` does\n";
+    let told = "note: it is in the place of `slow` of `demo`, which an undo does not bring back: `davit apply slow --force` does\n";
     assert_eq!(fast.err, told);
     let again = demo.run(&["apply", "slow", "--force"]);
     assert_eq!((again.code, again.err.as_str()), (0, ""), "the operator's own frame");

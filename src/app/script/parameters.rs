@@ -96,5 +96,6 @@ pub(super) fn param(host: &SharedHost, lua: &Lua, name: &str, default: Value) ->
         }
         _ => Some(Value::String(lua.create_string(&text)?)),
     };
-    value.ok_or_else(|| error(format!("`--set {name}={text}`: `{name}` is {kind}, as its default is")))
+    let range = if text.contains(':') { "; a range for `davit sweep` has a step: FROM:TO:STEP" } else { "" };
+    value.ok_or_else(|| error(format!("`--set {name}={text}`: `{name}` is {kind}, as its default is{range}")))
 }
