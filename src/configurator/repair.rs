@@ -32,6 +32,8 @@ pub(super) enum By {
     Recovery,
     /// The request of a batch under way, by that number: the undo of what broke it. `moving`: it does not go without what moves.
     Request { number: u32, moving: bool },
+    /// Nobody, to pop a frame while everything is taken down.
+    Stopping,
     /// Nobody: a component came back.
     Nobody,
 }
@@ -102,6 +104,13 @@ impl Engine {
         parts
     }
 
+    /// What something safe had interrupted has gone back since: what has broken meanwhile is not to be as that had made it.
+    pub(super) fn taken_back(&mut self, back: &[(usize, Step)], parts: &[PartEnd]) {
+        let gone = |part: usize| matches!(parts[part], PartEnd::Failed(_) | PartEnd::Cancelled);
+        let steps: Vec<Step> = back.iter().filter(|(part, _)| gone(*part)).map(|(_, step)| step.clone()).collect();
+        self.world.expects_back(&steps);
+    }
+
     /// An undo is done beside what is broken, of which this is expected now. What is left of it, since it would move, is about the frame in
     /// force that had moved it: that is lost.
     pub(super) fn leave(&mut self, of: &Arc<Residual>, expected: Snapshot) {
@@ -121,13 +130,15 @@ impl Engine {
     }
 
     /// Looks once more at something broken that somebody is about to be refused for: where it has become as the model has it, by what was undone
-    /// or written since, it is broken no more. Nothing is done for that, and what nobody knows stays so.
+    /// or written since, it is broken no more. Nothing is done for that. What nobody knows is accepted so only where nothing is in force any more of
+    /// what had called it: nobody's undo would accept it.
     pub(super) fn is_right_again(&mut self, of: &Arc<Residual>) -> bool {
-        if !of.unsettled.is_empty() {
+        let Some(at) = self.place_of(of) else { return false };
+        let known = of.unsettled.is_empty() || self.world.is_nobodys(&self.world.broken[at]);
+        if !known || !self.read_broken(at) {
             return false;
         }
-        let Some(at) = self.place_of(of) else { return false };
-        if !self.read_broken(at) {
+        if of.unsettled.iter().any(|step| self.world.quarantined.contains(&step.component())) {
             return false;
         }
         let Some(broken) = self.place_of(of).map(|at| &self.world.broken[at]) else { return false };
@@ -168,7 +179,7 @@ impl Engine {
             By::Request { moving, .. } => self.request_of(by).is_some_and(|request| {
                 moving && request.why == Why::Asked && !keeps_still(&self.world, request, components)
             }),
-            By::Nobody => false,
+            By::Stopping | By::Nobody => false,
         }
     }
 
@@ -185,7 +196,7 @@ impl Engine {
         let components: Vec<ComponentName> = broken.components.iter().copied().collect();
         let mut observed = self.read(&components);
         let mut withheld = None;
-        let undone = matches!(by, By::Request { moving: false, .. });
+        let undone = matches!(by, By::Request { moving: false, .. } | By::Stopping);
         if observed {
             self.note_quarantine();
             // Made of what is there now: others go on while it is looked.

@@ -8,7 +8,7 @@ use super::progress::Progress;
 use super::repair::Repaired;
 use super::request::{Reason, Request};
 use super::running::{Purpose, Running};
-use crate::model::{Ask, ConfigId, RequestId, Verdict};
+use crate::model::{Ask, ConfigId, RequestId, Step, Verdict};
 use crate::stack::{
     About, Batch, Broken, Endings, Frame, FrameId, Gone, Group, Part, Pile, Planned, Rules, Stopped, TakenAlong, Why,
     settle, take_up,
@@ -22,6 +22,8 @@ use std::time::Duration;
 /// What was carried out of a group.
 struct Carried<'c> {
     planned: &'c Planned,
+    /// What leads back where something safe interrupted it, and something is broken.
+    back: Vec<(usize, Step)>,
     /// Parts that stand for what they should, with the numbers of their conditions.
     stood: &'c [(usize, u64)],
     /// The safe configuration that interrupted it.
@@ -183,6 +185,8 @@ impl Engine {
         }
         match purpose {
             Purpose::Requests(number, group) => {
+                let goes_back = machine.interrupted().is_some() && !self.world.broken.is_empty();
+                let back = if goes_back { machine.undoing() } else { Vec::new() };
                 let end = machine.end();
                 // It is dropped when everybody has been answered: a long plan takes its time for that.
                 let reason = machine.interrupted();
@@ -190,7 +194,7 @@ impl Engine {
                     number,
                     group,
                     end.parts,
-                    Some(Carried { planned: machine.planned(), stood: &stood, reason, since }),
+                    Some(Carried { planned: machine.planned(), back, stood: &stood, reason, since }),
                 );
                 self.take_up(number);
             }
@@ -218,7 +222,8 @@ impl Engine {
         let settled = settle(&requests, &group, &endings, stopped);
         let mut confirm: Vec<(Request, FrameId)> = Vec::new();
         let mut reasons: Vec<Option<Reason>> = Vec::new();
-        if let Some(Carried { planned, stood, since, .. }) = carried {
+        if let Some(Carried { planned, back, stood, since, .. }) = carried {
+            self.taken_back(&back, &parts);
             let edits = planned.parts.iter().map(|part| &part.edits);
             let pushed = self.world.take_over(edits, &endings, &busy);
             if let (Some(of), Some(left)) = (&group.mends, group.left.take()) {

@@ -7,11 +7,11 @@
 
 use super::control::{Moment, StoppingBegan, TakenDown};
 use super::engine::Engine;
-use super::repair::By;
+use super::repair::{By, Repaired};
 use super::request::{Reason, Request};
 use crate::model::{Ask, ConfigId, RequestId};
 use crate::stack::claims::is_of_system;
-use crate::stack::{Batch, Frame, FrameId, Inverse, LedDown, Op, Planned, Requester, Why, transaction};
+use crate::stack::{Batch, Beside, Frame, FrameId, Inverse, LedDown, Op, Planned, Requester, Why, transaction};
 use crate::system::step;
 use crate::time::Time;
 use crate::transaction::{Input, PartEnd, Transaction};
@@ -207,15 +207,22 @@ impl Engine {
             if let Some(at) = of(self)
                 && self.read_broken(at)
                 && let Some(at) = of(self)
-                && let Some(planned) = self.world.straight(at, frame.id, &self.given.context)
+                && let Some((planned, left)) = self.world.undo_mended(at, (frame.id, &[]), &self.given.context)
             {
                 let residual = self.world.broken[at].residual.clone();
                 self.pop_as(frame, planned, deadline)?;
-                self.forget_broken(&residual);
+                match left {
+                    Some(left) => self.leave(&residual, left),
+                    None => self.forget_broken(&residual),
+                }
                 return Ok(());
             }
-            if let Some(at) = of(self) {
-                self.repair(at, By::Recovery).map_err(Reason::Broken)?;
+            // Nobody has asked for anything to move but what is taken back.
+            if let Some(at) = of(self)
+                && self.repair(at, By::Stopping).map_err(Reason::Broken)? == Repaired::Rests
+                && let Some(at) = of(self)
+            {
+                return self.pop_beside(frame, at, deadline);
             }
             if self.world.stack.frame(frame.id).is_none() {
                 return Ok(());
@@ -229,6 +236,20 @@ impl Engine {
         let planned = transaction(&self.world.system, &self.world.stack, &ops, &self.given.context)
             .map_err(|refusal| Reason::Refused(refusal.findings))?;
         self.pop_as(frame, planned, deadline)
+    }
+
+    /// Pops a frame beside what is broken of it, since that would have to move.
+    fn pop_beside(&mut self, frame: &Arc<Frame>, at: usize, deadline: Time) -> Result<(), Reason> {
+        let residual = self.world.broken[at].residual.clone();
+        let ops = [Op::Undo(frame.id)];
+        let planned = transaction(&self.world.system, &self.world.stack, &ops, &self.given.context)
+            .map_err(|refusal| Reason::Refused(refusal.findings))?;
+        let Beside::Left(left) = self.world.beside(at, (frame.id, &[]), &planned, &self.given.context) else {
+            return Err(Reason::StillBroken(residual));
+        };
+        self.pop_as(frame, planned, deadline)?;
+        self.leave(&residual, left);
+        Ok(())
     }
 
     fn pop_as(&mut self, frame: &Frame, planned: Planned, deadline: Time) -> Result<(), Reason> {

@@ -50,6 +50,7 @@ pub use request::{Batch, FrameId, LedDown, Request, Requester, Scope, Stillness,
 pub use settle::{About, Ending, Endings, SafeEnd, Settled, Stopped, settle};
 pub use share::{HandOver, calls, components, is_kept, shares, staying};
 pub use stands::{is_stood_down, running_for};
+pub use still::Beside;
 pub use work::{Along, Op, Part, Planned, places, transaction};
 pub use world::{Broken, SafeWrites, World};
 

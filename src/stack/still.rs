@@ -4,14 +4,14 @@
 //! and is from then on about the frame that had brought it there: the undo of that one takes it back, and an operator who recovers mends it.
 
 use super::mend::goes_on;
-use super::{Frame, FrameId, Planned, Reason, Residual, World};
-use crate::model::{Snapshot, Step, Transition};
+use super::{Broken, Frame, FrameId, Planned, Reason, Requester, Residual, World};
+use crate::model::{ConfigId, Snapshot, Step, Transition};
 use crate::plan::PlanContext;
 use crate::system::{System, View as _, diff, moves_any, step, touch, without};
 use std::sync::Arc;
 
 /// What comes of something broken when an undo is done beside it.
-pub(super) enum Beside {
+pub enum Beside {
     /// It is left so, and this is expected of it.
     Left(Snapshot),
     /// The undo would move what it does not undo: what is broken is mended first, since it needs that.
@@ -23,7 +23,7 @@ pub(super) enum Beside {
 impl World {
     /// The undo of a frame, with those of others that come first, in one net with what mends what is broken at this place, and what
     /// of that is left, as it is expected then. Nothing moves but what is undone. None: each goes by itself.
-    pub(super) fn undo_mended(
+    pub fn undo_mended(
         &self,
         at: usize,
         of: (FrameId, &[FrameId]),
@@ -43,13 +43,7 @@ impl World {
     }
 
     /// What comes of what is broken at this place when `planned`, the undo of a frame and others, is done beside it.
-    pub(super) fn beside(
-        &self,
-        at: usize,
-        of: (FrameId, &[FrameId]),
-        planned: &Planned,
-        context: &PlanContext,
-    ) -> Beside {
+    pub fn beside(&self, at: usize, of: (FrameId, &[FrameId]), planned: &Planned, context: &PlanContext) -> Beside {
         let steps = |planned: &Planned| planned.steps.iter().map(|planned| planned.step.clone()).collect::<Vec<Step>>();
         match Self::undo_in(&self.as_meant(&self.broken[at]), &self.stack, of, context) {
             Ok(undo) if moves_only(planned, &steps(&undo)) => Beside::Left(self.left_by(at, &steps(&undo))),
@@ -127,6 +121,23 @@ impl World {
             }
         }
         broken.components.retain(|name| !expected.components.contains_key(name));
+    }
+
+    /// What was being done when something safe came is taken back by these steps: what is broken since is not expected with it any more.
+    pub fn expects_back(&mut self, steps: &[Step]) {
+        let about = |broken: &Broken| {
+            let own = broken.own();
+            steps.iter().any(|step| touch::components(step).iter().any(|of| own.contains(of)))
+        };
+        for at in (0..self.broken.len()).filter(|at| about(&self.broken[*at])).collect::<Vec<_>>() {
+            self.broken[at].expected = self.left_by(at, steps);
+        }
+    }
+
+    /// Whether nothing is in force any more of what had broken this: then nobody's undo is about it.
+    pub fn is_nobodys(&self, broken: &Broken) -> bool {
+        let in_force = |(id, by): (ConfigId, Requester)| self.stack.newest_of(id, Some(by)).is_some();
+        broken.frame.is_none_or(|frame| self.stack.frame(frame).is_none()) && !broken.culprit.is_some_and(in_force)
     }
 
     /// What is broken at this place is about another frame from now on, or about none: the undo of that repairs it.

@@ -248,6 +248,17 @@ impl Transaction {
         self.own()
     }
 
+    /// What leads back from all that it was to do, latest first, each step with the part that it is of.
+    pub fn undoing(&self) -> Vec<(usize, Step)> {
+        let mut list = Vec::new();
+        for (i, planned) in (0..).zip(self.forward.list.iter()) {
+            let part = self.part_of(i);
+            list.extend(planned.undo.steps().iter().rev().map(|step| (part, step.clone())));
+        }
+        list.reverse();
+        list
+    }
+
     /// What came of it, once it is over: told once.
     pub fn end(&mut self) -> TransactionEnd {
         self.end.take().expect("it is over")

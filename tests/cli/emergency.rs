@@ -86,6 +86,53 @@ fn letting_go_starts_nothing() {
     assert_eq!(gave_up.last().unwrap(), "root.off", "a recovery mends it, and the way down is free");
 }
 
+/// A stop interrupts what is then taken back, and fails in part: its end makes nothing of that again, and starts nothing.
+#[test]
+fn what_was_taken_back_meanwhile_is_not_made_again() {
+    let demo = belt();
+    demo.replace(
+        "belt/configurations.yaml",
+        "- create: { component: motor, type: Motor }",
+        "- create: { component: motor, type: Motor }\n      - create: { component: other, type: Motor }",
+    );
+    demo.replace("belt/configurations.yaml", "[\"motor:stopped\"]", "[\"motor:stopped\", \"other:stopped\"]");
+    demo.replace("belt/configurations.yaml", "[\"motor:running\"]", "[\"motor:running\", \"other:running\"]");
+    let story = |slow: &str, then: &str| {
+        format!(
+            "deploy('deployment.yaml') raise('e_end') wait_state('off', 2)
+             fault('{slow}', 'slow', 1, 0.2) fault('operation_call motor.brake', 'lost', 1)
+             raise('e_start') wait(0.1) raise('e_stop') wait(5) local since = now()
+             for _, one in ipairs(drift()) do say(one.how) end
+             {then} wait(1)
+             for _, entry in ipairs(log{{ since = since }}) do
+               for _, done in ipairs(entry.steps or {{}}) do
+                 if done.step:find('^start') or done.step:find('^create') then say(done.step .. ' by ' .. (entry.answer or entry.what)) end
+               end
+             end
+             raise('e_end') wait(1) say(active()[#active()])"
+        )
+    };
+    for slow in ["start other", "create other"] {
+        for then in ["raise('e_end')", "raise('e_reset')", "pcall(recover, 'back')"] {
+            let mut told = said(&demo, &story(slow, then));
+            told.retain(|line| !line.contains("note  "));
+            assert_eq!(told, ["unknown", "root.off"], "{slow}, {then}");
+        }
+    }
+}
+
+/// A release of which nobody knows whether it happened, and a stop meanwhile: what is let go of later is let go of, and the way down is free.
+#[test]
+fn what_nobody_knows_of_something_that_is_over_stands_in_nobodys_way() {
+    let told = said(
+        &belt(),
+        "deploy('deployment.yaml') raise('e_stop') wait_answer('stop.ok', 1)
+         fault('operation_call motor.release', 'lost', 1) raise('e_end') wait(0.5) raise('e_stop') wait(5)
+         raise('e_end') wait(2) say(active()[#active()])",
+    );
+    assert_eq!(told, ["root.off"]);
+}
+
 /// What something safe in force has written, or its place, is changed by hand only with force, also where it is listed; whoever looks takes it
 /// for held.
 #[test]
