@@ -77,7 +77,7 @@ impl Engine {
             (Some(PartEnd::Broken(part)), Some(_)) => {
                 group.left = None;
                 self.world.breaks_beside(at, &mut part.expected);
-                if self.world.broken[at].components.is_empty() {
+                if self.world.broken[at].own().is_empty() {
                     self.forget_broken(&of);
                 }
             }
@@ -117,7 +117,7 @@ impl Engine {
         let Some(at) = self.place_of(of) else { return };
         let Some(mend) = self.world.is_left(at, expected) else {
             let residual = self.world.broken[at].residual.clone();
-            return self.forget_broken(&residual);
+            return self.is_whole(&residual);
         };
         // What is safe has not moved it: it is undone beside what is broken.
         let owner = mend.iter().find_map(|step| self.wrote(step, |frame| !frame.safe));
@@ -146,19 +146,29 @@ impl Engine {
         if !system::diff::reached(&self.world.system, &meant) || self.world.is_hidden(broken) {
             return false;
         }
-        self.forget_broken(of);
+        self.is_whole(of);
         self.drop_empty(frame);
         true
     }
 
+    /// Something broken is as the model has it: what it was about is there again.
+    pub(super) fn is_whole(&mut self, of: &Arc<Residual>) {
+        let Some(at) = self.place_of(of) else { return };
+        let difference = self.world.broken[at].residual.difference.clone();
+        self.forget_broken(of);
+        for step in &difference {
+            if let Some(frame) = self.wrote(step, |_| true)
+                && self.world.broken.iter().all(|broken| broken.frame != Some(frame.id))
+            {
+                self.is_found_again(frame.configuration);
+            }
+        }
+    }
+
+    /// Something broken is no more, or is part of something else that is.
     pub(super) fn forget_broken(&mut self, of: &Arc<Residual>) {
         if let Some(at) = self.place_of(of) {
             let broken = self.world.broken.remove(at);
-            for step in &broken.residual.difference {
-                if let Some(frame) = self.wrote(step, |_| true) {
-                    self.is_found_again(frame.configuration);
-                }
-            }
             self.world.hand_meant(&broken);
         }
         self.changed();
@@ -228,7 +238,7 @@ impl Engine {
         let out = |step: &Step| self.world.quarantined.contains(&step.component());
         let out = broken.residual.unsettled.iter().any(out);
         if observed && system::diff::reached(&self.world.system, &wanted) && !out && !self.world.is_hidden(&broken) {
-            self.forget_broken(&broken.residual);
+            self.is_whole(&broken.residual);
             self.drop_empty(broken.frame);
             return Ok(Repaired::Whole);
         }

@@ -22,7 +22,7 @@ pub(super) fn overwrites_safe(world: &World, request: &Request, planned: &Planne
         return None;
     }
     let of = &planned.parts[part];
-    if of.frame.as_ref().is_some_and(|frame| frame.safe) {
+    if of.edits.push.as_ref().is_some_and(|frame| frame.safe) {
         return None;
     }
     let popped = planned.popped.iter().filter(|frame| of.edits.pops.iter().any(|(id, _)| *id == frame.id));

@@ -32,7 +32,7 @@ impl Broken {
     }
 
     /// The components of which it is known what they are expected to be.
-    pub(super) fn own(&self) -> Vec<ComponentName> {
+    pub fn own(&self) -> Vec<ComponentName> {
         self.components.difference(&self.guests).copied().collect()
     }
 

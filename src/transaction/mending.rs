@@ -83,7 +83,7 @@ impl Transaction {
             // Who gives it up, or wants it taken back, has asked for what it has moved, and for nothing else.
             let own: Vec<ComponentName> = self.forward.moved().collect();
             let others = |step: &Step, view: &Overlay<'_>| step::moves(step, view) && !own.contains(&step.component());
-            let steps = if asked { without(steps, live, others) } else { steps };
+            let steps = if asked && moves_any(&steps, live) { without(steps, live, others) } else { steps };
             if !steps.is_empty() && (asked || !moves_any(&steps, live)) {
                 let done = self.forward.done.iter().map(|i| slot(&self.forward.list[*i as usize].step));
                 let done: FxHashSet<Slot> = done.collect();

@@ -285,4 +285,11 @@ shutdown: { event: e_end, down: off, within_s: 5 }
     let kept = "`slow`, whose undo had failed before, was undone with it";
     goes_down(&demo, &script("raise('e_end')"), &["build.undone", kept]);
     goes_down(&demo, &script("fault('port_write belt.speed', 'fail', 2) raise('e_end')"), &["build.undone", kept]);
+    // An undo that is refused, for what stands in its way, has not started it either.
+    let refused = "`build` cannot be undone before `slow`";
+    goes_down(
+        &demo,
+        &script("undo('build', { force = true }) wait(0.1)"),
+        &["build.undo.failed", refused, "build.undone"],
+    );
 }
