@@ -235,13 +235,7 @@ impl Product<'_> {
                     self.owed(&mut state, request);
                     if *verdict == Verdict::UndoFailed {
                         state.stayed = true;
-                        let left = self.frames_left(&state);
-                        let there = self.worlds.get(state.world).is_some_and(|w| w.left_with(request, &left).is_some());
-                        let went = self.worlds.stay(state.world, state.world, std::iter::once(*request), &left);
-                        self.go(&mut state, &went);
-                        if !there {
-                            state.change(|seldom| _ = request.leaves(seldom.safe.iter_mut()));
-                        }
+                        self.lets_go(&mut state, request);
                     }
                     self.due(&mut state, *request, *verdict);
                 }
@@ -254,6 +248,23 @@ impl Product<'_> {
         }
         self.begin(&mut state);
         state
+    }
+
+    /// An undo that a safe configuration has kept from beginning lets go of what it is about.
+    fn lets_go(&mut self, state: &mut ProductState, undo: &Request) {
+        let newest = self.worlds.claims.newest_is_meant(undo);
+        let coming =
+            |state: &mut ProductState| state.change(|seldom| undo.leaves(newest, seldom.safe.iter_mut()).is_some());
+        if newest && coming(state) {
+            return;
+        }
+        let left = self.frames_left(state);
+        let there = self.worlds.get(state.world).is_some_and(|world| world.left_with(undo, &left).is_some());
+        let went = self.worlds.stay(state.world, state.world, std::iter::once(*undo), &left);
+        self.go(state, &went);
+        if !there {
+            coming(state);
+        }
     }
 
     /// A safe configuration interrupts what is under way in its (sub)system.

@@ -152,6 +152,7 @@ impl Engine {
                 PartEnd::Failed(_) | PartEnd::Cancelled | PartEnd::Anew => {}
             }
         }
+        self.left_beside(end.beside);
         self.changed();
     }
 }

@@ -309,8 +309,9 @@ impl Engine {
                 Arrived::Told(request, verdict, reason) => {
                     self.owe(request);
                     if verdict == Verdict::UndoFailed {
+                        let newest = self.given.claims.newest_is_meant(&request);
                         let held = self.frames_left();
-                        if !self.world.stays(&request, &held) {
+                        if !(newest && self.leaves_coming(&request) || self.world.stays(&request, &held)) {
                             self.leaves_coming(&request);
                         }
                     }

@@ -219,7 +219,9 @@ impl Engine {
         }
         let edits = planned.parts[0].edits.clone();
         let spec = self.spec(&planned, true);
-        match self.carry_out(Transaction::new(planned, spec)).end().parts.into_iter().next() {
+        let end = self.carry_out(Transaction::new(planned, spec)).end();
+        self.left_beside(end.beside);
+        match end.parts.into_iter().next() {
             Some(PartEnd::Done) | None => {
                 self.world.stack.apply([&edits], &[]);
                 self.changed();

@@ -10,9 +10,9 @@ use super::teardown::own_plan;
 use crate::limits;
 use crate::model::{ComponentName, RequestId, RunState, Snapshot, Step, Verdict};
 use crate::plan::undo::in_order;
-use crate::stack::{Edits, FrameId, Group, HandOver, Inverse, Residual, Why, keeps_still};
+use crate::stack::{Broken, Edits, FrameId, Group, HandOver, Inverse, Residual, Why, keeps_still};
 use crate::system::{self, View as _, step, touch};
-use crate::transaction::{BrokenPart, PartEnd, Spec, Transaction};
+use crate::transaction::{BrokenPart, LeftBeside, PartEnd, Spec, Transaction};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -111,6 +111,13 @@ impl Engine {
         self.world.expects_back(&steps);
     }
 
+    /// Parts that are done have led on what else is broken of their components as well: it is expected as these steps, each of a part, have left it.
+    pub(super) fn went_on(&mut self, group: &Group, steps: &[(usize, Step)], parts: &[PartEnd]) {
+        let done = steps.iter().filter(|(part, _)| matches!(parts[*part], PartEnd::Done));
+        let done: Vec<Step> = done.map(|(_, step)| step.clone()).collect();
+        self.world.expects_done(&done, group.mends.as_ref());
+    }
+
     /// An undo is done beside what is broken, of which this is expected now. What is left of it, since it would move, is about the frame in
     /// force that had moved it: that is lost.
     pub(super) fn leave(&mut self, of: &Arc<Residual>, expected: Snapshot) {
@@ -127,6 +134,26 @@ impl Engine {
         if let Some(owner) = owner {
             self.lose(owner.configuration, residual.cause.clone());
         }
+    }
+
+    /// Something that has gone back has found what others had moved otherwise than it was believed to be: that is left so, and told.
+    pub(super) fn left_beside(&mut self, beside: Option<LeftBeside>) {
+        let Some(LeftBeside { residual, expected, guests }) = beside else { return };
+        let components = residual.components().collect();
+        let of = residual.clone();
+        let (culprit, frame, seen) = (None, None, None);
+        let expects = expected.clone();
+        self.world.ends_broken(Broken {
+            residual,
+            components,
+            culprit,
+            frame,
+            mendable: false,
+            expected: expects,
+            guests,
+            seen,
+        });
+        self.leave(&of, expected);
     }
 
     /// Looks once more at something broken that somebody is about to be refused for: where it has become as the model has it, by what was undone

@@ -14,7 +14,7 @@ use crate::stack::{
     settle, take_up,
 };
 use crate::time::Time;
-use crate::transaction::{BrokenPart, Input, Limit, PartEnd, Spec, Transaction};
+use crate::transaction::{BrokenPart, Input, LeftBeside, Limit, PartEnd, Spec, Transaction};
 use smallvec::SmallVec;
 use std::sync::Arc;
 use std::time::Duration;
@@ -22,6 +22,8 @@ use std::time::Duration;
 /// What was carried out of a group.
 struct Carried<'c> {
     planned: &'c Planned,
+    /// Its steps, each with the part that it is of, where something is broken.
+    steps: Vec<(usize, Step)>,
     /// What leads back where something safe interrupted it, and something is broken.
     back: Vec<(usize, Step)>,
     /// Parts that stand for what they should, with the numbers of their conditions.
@@ -30,6 +32,8 @@ struct Carried<'c> {
     reason: Option<Reason>,
     /// The number of the first frame that could come after it began.
     since: FrameId,
+    /// What differs beside it.
+    beside: Option<LeftBeside>,
 }
 
 impl Engine {
@@ -185,16 +189,18 @@ impl Engine {
         }
         match purpose {
             Purpose::Requests(number, group) => {
-                let goes_back = machine.interrupted().is_some() && !self.world.broken.is_empty();
-                let back = if goes_back { machine.undoing() } else { Vec::new() };
+                let broken = !self.world.broken.is_empty();
+                let back = if broken && machine.interrupted().is_some() { machine.undoing() } else { Vec::new() };
+                let steps = if broken { machine.all_steps() } else { Vec::new() };
                 let end = machine.end();
                 // It is dropped when everybody has been answered: a long plan takes its time for that.
-                let reason = machine.interrupted();
+                let (reason, planned) = (machine.interrupted(), machine.planned());
+                let beside = end.beside;
                 self.book(
                     number,
                     group,
                     end.parts,
-                    Some(Carried { planned: machine.planned(), back, stood: &stood, reason, since }),
+                    Some(Carried { planned, steps, back, stood: &stood, reason, since, beside }),
                 );
                 self.take_up(number);
             }
@@ -222,10 +228,11 @@ impl Engine {
         let settled = settle(&requests, &group, &endings, stopped);
         let mut confirm: Vec<(Request, FrameId)> = Vec::new();
         let mut reasons: Vec<Option<Reason>> = Vec::new();
-        if let Some(Carried { planned, back, stood, since, .. }) = carried {
+        if let Some(Carried { planned, steps, back, stood, since, beside, .. }) = carried {
             self.taken_back(&back, &parts);
             let edits = planned.parts.iter().map(|part| &part.edits);
             let pushed = self.world.take_over(edits, &endings, &busy);
+            self.went_on(&group, &steps, &parts);
             if let (Some(of), Some(left)) = (&group.mends, group.left.take()) {
                 self.leave(of, left);
             }
@@ -256,6 +263,7 @@ impl Engine {
                     self.left_broken(&request, *broken, since);
                 }
             }
+            self.left_beside(beside);
         }
         self.world.keep(&requests, &settled);
         self.forget_confirmations();

@@ -110,14 +110,17 @@ impl Engine {
         (steps, numbers)
     }
 
-    /// A safe configuration that is not there yet is let go of, and the undo is not carried out.
-    pub(super) fn leaves_coming(&mut self, undo: &Request) {
+    /// A safe configuration that is not there yet is let go of, and the undo is not carried out. False: none is coming.
+    pub(super) fn leaves_coming(&mut self, undo: &Request) -> bool {
         let applied = self.running.iter_mut().rev().filter_map(|running| match &mut running.purpose {
             Purpose::Safe(safe) => Some(&mut safe.0),
             _ => None,
         });
         // Those under way came before those that wait.
-        let Some(left) = undo.leaves(applied.chain(self.safety.waiting.iter_mut())).map(|left| left.id) else { return };
+        let coming = applied.chain(self.safety.waiting.iter_mut());
+        let Some(left) = undo.leaves(self.given.claims.newest_is_meant(undo), coming).map(|left| left.id) else {
+            return false;
+        };
         let of_it = |safe: &(Request, Frame, Touched)| safe.0.id == left;
         for running in &mut self.running {
             if let Purpose::Safe(safe) = &mut running.purpose
@@ -126,6 +129,7 @@ impl Engine {
                 (safe.1.scope, safe.1.left) = (None, true);
             }
         }
+        true
     }
 
     /// Values on their way to the platform, of steps that were interrupted.

@@ -263,7 +263,9 @@ impl Engine {
         let mut spec = self.spec(&planned, false);
         spec.limits.iter_mut().for_each(|limit| limit.until = limit.until.min(deadline));
         let since = self.world.stack.next();
-        match self.carry_out(Transaction::new(planned, spec)).end().parts.into_iter().next() {
+        let end = self.carry_out(Transaction::new(planned, spec)).end();
+        self.left_beside(end.beside);
+        match end.parts.into_iter().next() {
             Some(PartEnd::Done) | None => {
                 self.world.stack.apply([&edits], &[]);
                 self.changed();

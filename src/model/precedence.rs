@@ -11,7 +11,8 @@ pub enum Precedence {
     /// What came first goes first.
     #[default]
     Queued,
-    /// Before those that are queued; one that comes while it waits is the same.
+    /// Before those that are queued; one that comes while it waits is the same, unless what begins or ends the deployment came in between:
+    /// then it is heard before that and once more after it, for the last word is that of who wants it safe.
     Urgent,
     /// The same, but it waits from then on where it came last: which of those that begin and end a deployment came last says
     /// where that is to go.
@@ -36,14 +37,26 @@ impl Deployment {
     }
 }
 
-/// The places of what is taken first of what has come, in the order in which it came: of an urgent one wherever it came. Empty:
-/// nothing has come.
+/// The places of what is taken first of what has come, in the order in which it came: of an urgent one wherever it came, but for what is heard
+/// once more. Empty: nothing has come.
 pub fn taken_first<E: Copy + PartialEq>(came: &[(E, Precedence)]) -> SmallVec<[usize; 2]> {
-    let comes_again = |at: usize| came[at + 1..].iter().any(|(other, _)| *other == came[at].0);
-    let waits_here = |at: usize| came[at].1 == Precedence::Urgent || !comes_again(at);
-    let urgent = (0..came.len()).find(|at| came[*at].1.is_urgent() && waits_here(*at));
-    match urgent {
-        Some(first) => (0..came.len()).filter(|at| came[*at].0 == came[first].0).collect(),
+    let own = |of: usize| (0..came.len()).filter(move |at| came[*at].0 == came[of].0);
+    // Where a safety event is heard once more: behind the last that came before it of what begins and ends the deployment.
+    let again = |of: usize| {
+        let (first, last) = (own(of).next()?, own(of).last()?);
+        let between = (first..last).rfind(|at| came[*at].1 == Precedence::UrgentAsLast)?;
+        own(of).find(|at| *at > between)
+    };
+    let waits_here = |at: &usize| match came[*at].1 {
+        Precedence::Queued => false,
+        Precedence::Urgent => own(*at).next() == Some(*at) || again(*at) == Some(*at),
+        Precedence::UrgentAsLast => own(*at).last() == Some(*at),
+    };
+    match (0..came.len()).find(waits_here) {
+        Some(first) => {
+            let until = again(first).filter(|_| came[first].1 == Precedence::Urgent);
+            own(first).filter(|at| until.is_none_or(|until| *at < until)).collect()
+        }
         None => came.iter().take(1).map(|_| 0).collect(),
     }
 }

@@ -141,6 +141,12 @@ impl Claims {
         self.groups.get(&one).is_some_and(|group| self.groups.get(&other) == Some(group))
     }
 
+    /// Whether an undo that is not carried out lets go of what is still coming, and not of a frame that is there, where there are both: by its name
+    /// the newest is meant; and the frame of a visit before is replaced by what comes, whose undo came with that.
+    pub fn newest_is_meant(&self, undo: &Request) -> bool {
+        undo.scope.is_none() || matches!(undo.ask, Ask::UndoOf(id) if self.replaces(id, id))
+    }
+
     /// Adds one that names components only, and belongs to no group; in the place of one of that name. What a value that it gives
     /// makes them need is not known: the step that would take it is looked at when it comes.
     pub fn add(&mut self, configuration: &Configuration) {

@@ -132,13 +132,20 @@ impl Request {
     }
 
     /// An undo by which a coordinator lets go of something is not carried out, and there is no frame of it: it is of a safe configuration that
-    /// is still `coming` (the oldest first), and that nobody asks for any more. Visits are left in their order; by its name the newest is meant.
-    pub fn leaves<'r>(&self, coming: impl DoubleEndedIterator<Item = &'r mut Self>) -> Option<&'r mut Self> {
+    /// is still `coming` (the oldest first), and that nobody asks for any more. Visits are left in their order, unless the
+    /// `newest` is meant ([`Claims::newest_is_meant`]).
+    ///
+    /// [`Claims::newest_is_meant`]: super::claims::Claims::newest_is_meant
+    pub fn leaves<'r>(
+        &self,
+        newest: bool,
+        coming: impl DoubleEndedIterator<Item = &'r mut Self>,
+    ) -> Option<&'r mut Self> {
         let Ask::UndoOf(id) = self.ask else { return None };
         let of =
             |r: &&'r mut Self| (r.ask, r.scope, r.requester) == (Ask::Apply(id), self.scope, self.requester) && !r.gone;
         let mut coming = coming.filter(|_| self.lets_go());
-        let left = if self.scope.is_some() { coming.find(of) } else { coming.rfind(of) }?;
+        let left = if newest { coming.rfind(of) } else { coming.find(of) }?;
         left.gone = true;
         Some(left)
     }

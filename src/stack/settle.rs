@@ -150,9 +150,11 @@ impl World {
         busy: &[FrameId],
     ) -> (FrameId, Verdict) {
         let broken = end.failed.is_some();
+        let mut busy: SmallVec<[FrameId; 4]> = SmallVec::from_slice(busy);
         if broken {
             // What was done of it undoes what was done, and no more: what it was to take the place of is taken over with what that undoes,
-            // also where something else was under way.
+            // also where something else was under way, and about that itself: else that would seem to be in force, whatever was left of it.
+            busy.retain(|frame| edits.pops.iter().all(|(id, _)| id != frame));
             edits.pops.clear();
         }
         let frame = match end.failed {
@@ -169,7 +171,7 @@ impl World {
         let group = frame.group;
         let gone: SmallVec<[FrameId; 2]> = edits.pops.iter().map(|(frame, _)| *frame).collect();
         let before = if self.broken.is_empty() { Vec::new() } else { self.stack.frames().to_vec() };
-        let pushed = self.stack.push_safe(edits, frame, busy, &broken);
+        let pushed = self.stack.push_safe(edits, frame, &busy, &broken);
         if !before.is_empty() {
             let after = self.stack.clone();
             self.expects_no_more(&before, |frame| {

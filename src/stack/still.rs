@@ -125,13 +125,36 @@ impl World {
 
     /// What was being done when something safe came is taken back by these steps: what is broken since is not expected with it any more.
     pub fn expects_back(&mut self, steps: &[Step]) {
+        for at in self.broken_about(steps) {
+            self.broken[at].expected = self.left_by(at, steps);
+        }
+    }
+
+    /// These steps are done beside what is broken: of all but `mended`, for which that is known, what they are about is expected so. Where it was
+    /// expected elsewhere they have led on from what is there: who asked for them had the last word.
+    pub fn expects_done(&mut self, steps: &[Step], mended: Option<&Arc<Residual>>) {
+        for at in self.broken_about(steps) {
+            if mended.is_some_and(|mended| Arc::ptr_eq(mended, &self.broken[at].residual)) {
+                continue;
+            }
+            self.broken[at].expected = self.left_by(at, steps);
+            for step in steps {
+                if let Step::State { component, transition } = step
+                    && let Some(one) = self.broken[at].expected.components.get_mut(component)
+                {
+                    one.state = transition.target();
+                }
+            }
+        }
+    }
+
+    /// The places of what is broken of what these steps are about.
+    fn broken_about(&self, steps: &[Step]) -> Vec<usize> {
         let about = |broken: &Broken| {
             let own = broken.own();
             steps.iter().any(|step| touch::components(step).iter().any(|of| own.contains(of)))
         };
-        for at in (0..self.broken.len()).filter(|at| about(&self.broken[*at])).collect::<Vec<_>>() {
-            self.broken[at].expected = self.left_by(at, steps);
-        }
+        (0..self.broken.len()).filter(|at| about(&self.broken[*at])).collect()
     }
 
     /// Whether nothing is in force any more of what had broken this: then nobody's undo is about it.

@@ -17,6 +17,19 @@ use std::sync::Arc;
 pub struct TransactionEnd {
     /// What came of each part, in order.
     pub parts: Vec<PartEnd>,
+    /// What is otherwise beside it than it was believed to be.
+    pub beside: Option<LeftBeside>,
+}
+
+/// What something that has gone back has found otherwise, which is not its own: it would have to move.
+#[derive(Debug, Clone)]
+pub struct LeftBeside {
+    /// What differs.
+    pub residual: Arc<Residual>,
+    /// Its components as the model had them.
+    pub expected: Snapshot,
+    /// See [`Broken::guests`](crate::stack::Broken::guests).
+    pub guests: BTreeSet<ComponentName>,
 }
 
 /// What came of a part.
@@ -96,7 +109,7 @@ impl Transaction {
     }
 
     fn over(&mut self, parts: Vec<PartEnd>) {
-        self.end = Some(super::TransactionEnd { parts });
+        self.end = Some(TransactionEnd { parts, beside: None });
         self.phase = TransactionPhase::Over;
     }
 
@@ -279,8 +292,9 @@ impl Transaction {
             ..Residual::of(self.reason())
         };
         self.unsettled = unsettled;
-        let clean = residual.is_settled() && remaining.is_empty();
-        let missing = self.missing(part, live);
+        let beside = self.left_beside(part, &residual, wanted, live);
+        let clean = remaining.is_empty() && (residual.is_settled() || beside.is_some());
+        let missing = self.missing(part, if beside.is_some() { wanted } else { live });
         // Interrupted, each part is to blame for what is left of it.
         let forward = &self.forward;
         let differs: FxHashSet<ComponentName> = residual.components().collect();
@@ -339,6 +353,7 @@ impl Transaction {
             });
         }
         self.over(parts);
+        self.end.iter_mut().for_each(|end| end.beside.clone_from(&beside));
     }
 
     /// The end of a part of which nothing is left.

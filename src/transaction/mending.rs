@@ -3,8 +3,9 @@
 use super::back::{WayBack, chain};
 use super::run::StepsRun;
 use super::touched::Touched;
-use super::{Can, Transaction, TransactionPhase};
+use super::{Can, LeftBeside, Transaction, TransactionPhase};
 use crate::model::{ComponentName, OnFailure, RunState, Snapshot, Step};
+use crate::stack::Residual;
 use crate::system::touch::{Slot, slot};
 use crate::system::{Overlay, System, View as _, moves_any, step, without};
 use rustc_hash::FxHashSet;
@@ -73,17 +74,13 @@ impl Transaction {
         let adopted = seen.as_ref().map(|seen| live.adopt(&own, seen).is_ok());
         let observed = adopted == Some(true);
         if observed && self.phase == TransactionPhase::Looking && self.mends(part) {
-            let asked =
-                self.asked_back || !self.interrupted && self.planned.parts[part].on_failure == OnFailure::Rollback;
+            let asked = self.is_asked(part);
             let steps = self.own_difference(live, &wanted);
             let steps: Vec<Step> = steps
                 .into_iter()
                 .filter(|step| matches!(step, Step::Disconnect { .. }) || !can.quarantined.contains(&step.component()))
                 .collect();
-            // Who gives it up, or wants it taken back, has asked for what it has moved, and for nothing else.
-            let own: Vec<ComponentName> = self.forward.moved().collect();
-            let others = |step: &Step, view: &Overlay<'_>| step::moves(step, view) && !own.contains(&step.component());
-            let steps = if asked && moves_any(&steps, live) { without(steps, live, others) } else { steps };
+            let steps = if asked { self.not_of_others(steps, live) } else { steps };
             if !steps.is_empty() && (asked || !moves_any(&steps, live)) {
                 let done = self.forward.done.iter().map(|i| slot(&self.forward.list[*i as usize].step));
                 let done: FxHashSet<Slot> = done.collect();
@@ -95,6 +92,45 @@ impl Transaction {
             }
         }
         self.judge(part, &wanted, whole, observed, live, can);
+    }
+
+    /// Whether it was asked that it goes back: then what it has moved may move.
+    fn is_asked(&self, part: usize) -> bool {
+        self.asked_back || !self.interrupted && self.planned.parts[part].on_failure == OnFailure::Rollback
+    }
+
+    /// Those of these steps that can be done where nothing moves that it has not moved itself: who gives it up, or wants it taken back, has
+    /// asked for nothing else.
+    fn not_of_others(&self, steps: Vec<Step>, live: &System) -> Vec<Step> {
+        let own: Vec<ComponentName> = self.forward.moved().collect();
+        let others = |step: &Step, view: &Overlay<'_>| step::moves(step, view) && !own.contains(&step.component());
+        if moves_any(&steps, live) { without(steps, live, others) } else { steps }
+    }
+
+    /// What differs where it has taken back all that it has done, and nothing but what others had moved is otherwise than it was believed to
+    /// be: it is none of its doing.
+    pub(super) fn left_beside(
+        &self,
+        part: usize,
+        residual: &Residual,
+        wanted: &System,
+        live: &System,
+    ) -> Option<LeftBeside> {
+        let all_back = residual.left.is_empty() && self.perhaps.is_empty();
+        let known = residual.observed && residual.unsettled.is_empty();
+        if !all_back || !known || !residual.faulted.is_empty() || !residual.quarantined.is_empty() {
+            return None;
+        }
+        let mend = self.own_difference(live, wanted);
+        let goes_back = self.mends(part) && self.is_asked(part);
+        if !goes_back || mend.is_empty() || !self.not_of_others(mend, live).is_empty() {
+            return None;
+        }
+        let guests = residual.guests(&self.own());
+        let own: Vec<ComponentName> = residual.components().filter(|component| !guests.contains(component)).collect();
+        let difference = residual.difference.clone();
+        let residual = Arc::new(Residual { difference, ..Residual::of(residual.cause.clone()) });
+        Some(LeftBeside { residual, expected: wanted.snapshot_some(&own), guests })
     }
 
     /// Mends the difference between what is there and what should be.

@@ -30,7 +30,7 @@ mod settle;
 mod stand;
 mod touched;
 
-pub use end::{BrokenPart, PartEnd, TransactionEnd};
+pub use end::{BrokenPart, LeftBeside, PartEnd, TransactionEnd};
 pub use endings::{Stopping, can_fail, endings};
 pub use immediate::Doing;
 pub use limits::{Limit, Spec};
@@ -246,6 +246,12 @@ impl Transaction {
     /// The components that it is about.
     pub fn components(&self) -> Vec<ComponentName> {
         self.own()
+    }
+
+    /// All that it was to do, each step with the part that it is of.
+    pub fn all_steps(&self) -> Vec<(usize, Step)> {
+        let steps = (0..).zip(self.forward.list.iter());
+        steps.map(|(i, planned)| (self.part_of(i), planned.step.clone())).collect()
     }
 
     /// What leads back from all that it was to do, latest first, each step with the part that it is of.

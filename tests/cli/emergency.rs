@@ -84,6 +84,10 @@ fn letting_go_starts_nothing() {
     let gave_up = said(&demo, &story(gives_up, "recover('back')"));
     assert_eq!(gave_up[..2], ["started by run.ok", "root.failed stopped"].map(str::to_owned), "{gave_up:?}");
     assert_eq!(gave_up.last().unwrap(), "root.off", "a recovery mends it, and the way down is free");
+    // Where all is known it has gone back, and only the motor is otherwise: nobody has to recover.
+    let gives_up =
+        "fault('port_write motor.speed', 'slow', 1, 0.5) raise('e_faster') wait(0.2) raise('e_slower') wait(1)";
+    assert_eq!(said(&demo, &story(gives_up, "")), left);
 }
 
 /// A stop interrupts what is then taken back, and fails in part: its end makes nothing of that again, and starts nothing.
@@ -394,4 +398,57 @@ fn a_second_one_is_not_answered_by_the_first() {
         "deploy('deployment.yaml') fault('operation_call motor.brake', 'slow', 5, 0.5) {twice} {twice} shutdown()"
     );
     assert_eq!(said(&belt(), &script), ["0.5", "1.0"]);
+}
+
+/// What was undone beside something broken is not expected any more by anything else that is broken: nobody makes it again, and the way down
+/// is free. Two emergencies in part, and one whose end nobody knows of.
+#[test]
+fn what_was_undone_is_expected_by_nothing() {
+    let tell = "say(active()[#active()] .. ' ' .. tostring(state('motor'))) for _, one in ipairs(drift()) do if one.how == 'differs' then say(one.text) end end";
+    let lied = "fault('start motor', 'lie', 1) deploy('deployment.yaml')";
+    let twice = format!(
+        "{lied} fault('operation_call motor.brake', 'lost', 2) raise('e_stop') wait(2) raise('e_stop') wait(5)
+         raise('e_reset') wait(2) raise('e_end') wait(2) {tell} pcall(recover, 'back') raise('e_end') wait(2) {tell}"
+    );
+    assert_eq!(said(&belt(), &twice), ["root.off nil", "root.off nil"]);
+    let unknown = format!(
+        "{lied} fault('operation_call motor.release', 'lost', 1) raise('e_stop') wait(6) raise('e_reset') wait(2)
+         raise('e_end') wait(2) {tell} raise('e_stop') wait(1) raise('e_reset') wait(2) {tell} raise('e_end') wait(2) {tell}"
+    );
+    let mut told = said(&belt(), &unknown);
+    told.retain(|line| !line.contains("note  "));
+    assert_eq!(told, ["root.left unconfigured", "root.failed unconfigured", "root.off nil"]);
+}
+
+/// An emergency that cannot be done whole interrupts a change of speed, or the way down: it takes the place of its group's frame, as where nothing
+/// is under way, and its undo leads to where that of this one would have led.
+#[test]
+fn one_in_part_takes_the_place_of_what_is_being_replaced_or_undone() {
+    let demo = belt();
+    let also = |from: &str, to: &str| demo.replace("belt/configurations.yaml", from, &format!("{from}\n      - {to}"));
+    also("- create: { component: motor, type: Motor }", "create: { component: other, type: Motor }");
+    for speed in ["0.1", "0.4", "0.0"] {
+        let write = |of: &str| format!("port_write: {{ port: {of}.speed, value: {speed} }}");
+        also(&format!("- {}", write("motor")), &write("other"));
+    }
+    demo.replace("belt/configurations.yaml", "[\"motor:stopped\"]", "[\"motor:stopped\", \"other:stopped\"]");
+    demo.replace("belt/configurations.yaml", "[\"motor:running\"]", "[\"motor:running\", \"other:running\"]");
+    let story = |faults: &str, asks: &str| {
+        format!(
+            "deploy('deployment.yaml') {faults} raise('{asks}') wait(0.1) raise('e_stop') wait(7)
+             local function tell(when)
+                 local frames = {{}}
+                 for _, frame in ipairs(stack()) do frames[#frames + 1] = frame.configuration end
+                 say(when .. ' ' .. tostring(port('motor.speed')) .. ' ' .. tostring(port('other.speed')) .. ' ' .. #drift() .. ' ' .. table.concat(frames, ' '))
+             end
+             tell('stopped') raise('e_reset') wait(7) tell('reset') shutdown()"
+        )
+    };
+    let switch =
+        "fault('port_write other.speed = 0.4', 'slow', 1, 0.3) fault('port_write motor.speed = 0.0', 'fail', 1)";
+    let told = said(&demo, &story(switch, "e_faster"));
+    assert_eq!(told, ["stopped 0.4 0.0 0 build run stop", "reset nil nil 0 build run"]);
+    let undo = "fault('port_write other.speed', 'lost', 2)";
+    let told = said(&demo, &story(undo, "e_end"));
+    assert_eq!(told, ["stopped 0.0 0.1 0 build stop", "reset nil nil 0 build"]);
 }

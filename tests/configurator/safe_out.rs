@@ -1,8 +1,9 @@
 //! Safe configurations and values that are on their way to the platform when they come: nobody knows whether these are there.
 
 use crate::rig::*;
-use davit::model::{Configuration, Value};
+use davit::model::{Ask, Configuration, RequestId, Value};
 use davit::platform::simulated::{Delays, StepPattern};
+use davit::stack::{Batch, Request, Scope};
 use std::time::Duration;
 
 /// `A` with `k` 3, and a group of three of which two are safe.
@@ -80,5 +81,34 @@ fn what_one_takes_the_place_of_does_not_come_back_with_what_it_interrupted() {
             rig.in_step();
             rig.each_answered_once();
         }
+    }
+}
+
+/// A state that brings something safe with it is left and entered anew, and left again, before any of that has begun, and then another
+/// coordinator stops: the undo that this refuses let go of what comes last, and not of what that takes the place of. So it stands in
+/// nobody's way who leads down.
+#[test]
+fn what_is_let_go_before_it_has_begun_is_left() {
+    for (grouped, refused) in [("low", 1), ("", 2)] {
+        let rig = about_a(grouped);
+        let by_state = |number: u64, ask: Ask| Request {
+            scope: Some(Scope(7)),
+            ..Request::new(RequestId(number), ask, coordinator(COORDINATOR))
+        };
+        let (enter, leave) = (Ask::Apply(id("low")), Ask::UndoOf(id("low")));
+        rig.handle.submit(Batch::one(by_state(1001, enter))).unwrap();
+        rig.wait(1.0);
+        let again = [by_state(1002, leave), by_state(1003, enter)];
+        rig.handle.submit(again.into_iter().collect()).unwrap();
+        rig.handle.submit(Batch::one(by_state(1004, leave))).unwrap();
+        rig.submit_as("hold", coordinator("c2")).unwrap();
+        rig.wait(1.0);
+        let events = rig.events();
+        assert_eq!(events.iter().filter(|event| *event == "low.undo.failed").count(), refused, "{events:?}");
+        rig.handle.leaving(true);
+        assert_eq!(rig.ask_as("hold.undo", coordinator("c2")).last().unwrap(), "hold.undone");
+        assert_eq!(rig.ask("make.undo"), ["make.undone"], "{grouped}: {:?}", rig.frames());
+        assert_eq!(rig.frames(), [""; 0]);
+        rig.in_step();
     }
 }

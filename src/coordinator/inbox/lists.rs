@@ -74,6 +74,15 @@ impl Lists {
         &mut self.nodes[at as usize].incoming
     }
 
+    /// Those of a list in its order, and where they stand.
+    pub fn iter(&self, list: List) -> impl Iterator<Item = (u32, &Incoming)> {
+        let mut at = self.ends[list as usize].first;
+        std::iter::from_fn(move || {
+            let node = self.nodes.get(at as usize)?;
+            Some((std::mem::replace(&mut at, node.after), &node.incoming))
+        })
+    }
+
     /// Does something with each of a list, in its order.
     pub fn for_each_mut(&mut self, list: List, mut each: impl FnMut(&mut Incoming)) {
         let mut at = self.ends[list as usize].first;

@@ -2,7 +2,7 @@
 //! displaces another, and each waits for a bounded number of turns.
 //!
 //! 1. Urgent ones (declared safety events, those that begin and end the deployment), one of each at most, of the latter two in the
-//!    order in which they came last; then the words of
+//!    order in which they came last, of the former one more behind those; then the words of
 //!    the configurator, in its order: answers, whose room was taken when they were asked for, and what it says unasked
 //!    (`ID.lost`, `ID.reverted`, answers for which there was no room), one of each at most.
 //! 2. Reports: events of components, monitors and other coordinators. When their room is full there is still room for one of
@@ -135,9 +135,8 @@ impl Dropped {
     }
 }
 
-/// What there may be one of: an urgent event by its name; a notice also by the state that it is for, since a later visit's
-/// tells nothing of the answer that another state waits for.
-type Single = (List, EventName, Option<NodeId>);
+/// What there may be one of: a notice of its name for a state, since a later visit's tells nothing of the answer that another state waits for.
+type Single = (EventName, Option<NodeId>);
 
 /// Rooms that were taken and not used yet.
 #[derive(Debug, Default)]
@@ -174,12 +173,12 @@ pub(super) struct Inbox {
     held: HeldRoom,
     /// Answers that wait, which share a list with notices.
     answers: usize,
-    /// Urgent events and notices that wait, by what there may be one of.
+    /// Notices that wait, by what there may be one of.
     singles: FxHashMap<Single, u32>,
     /// Of each event that the chart waits for the newest report that waits.
     newest: FxHashMap<EventName, Option<u32>>,
-    /// Who else wants to know what becomes of an urgent event that waits.
-    joined: Vec<(EventName, u64)>,
+    /// Who else wants to know what becomes of an urgent event that waits, by where it does.
+    joined: Vec<(u32, u64)>,
     /// How often in a row the first class went while another one waited, how often an urgent event while a word did, and one
     /// of the other classes while the other did.
     row: usize,
@@ -273,17 +272,24 @@ impl Inbox {
         if incoming.overtakes {
             self.lists.for_each_mut(List::Outside, |waits| waits.overtaken = true);
         }
-        let single = (List::Urgent, incoming.event, None);
-        let Some(at) = self.singles.get(&single).copied() else {
-            let at = self.lists.push(List::Urgent, incoming);
-            self.singles.insert(single, at);
+        // The last one of its name that waits, whether there is one before it, and whether what begins or ends the deployment came since.
+        let (mut own, mut twice, mut since) = (None, false, false);
+        for (at, waits) in self.lists.iter(List::Urgent) {
+            if waits.event == incoming.event {
+                (own, twice, since) = (Some(at), own.is_some(), false);
+            } else {
+                since |= waits.last;
+            }
+        }
+        let Some(at) = own.filter(|_| incoming.last || twice || !since) else {
+            self.lists.push(List::Urgent, incoming);
             return Ok(Put::Waits);
         };
-        let at = if incoming.last {
+        let at = if incoming.last || since {
             let waits = self.lists.remove(at);
-            let at = self.lists.push(List::Urgent, waits);
-            self.singles.insert(single, at);
-            at
+            let now = self.lists.push(List::Urgent, waits);
+            self.joined.iter_mut().filter(|(place, _)| *place == at).for_each(|(place, _)| *place = now);
+            now
         } else {
             at
         };
@@ -291,7 +297,7 @@ impl Inbox {
         match incoming.ticket {
             0 => {}
             ticket if waits.ticket == 0 => waits.ticket = ticket,
-            ticket if self.joined.len() < self.bounds.joined => self.joined.push((incoming.event, ticket)),
+            ticket if self.joined.len() < self.bounds.joined => self.joined.push((at, ticket)),
             _ => {
                 self.dropped.outside += 1;
                 return Err(NotAccepted::Full);
@@ -339,9 +345,8 @@ impl Inbox {
         match incoming.class {
             Class::Urgent => {
                 self.in_hand = Some(incoming.event);
-                self.singles.remove(&(List::Urgent, incoming.event, None));
-                tickets.extend(self.joined.iter().filter(|(event, _)| *event == incoming.event).map(|(_, t)| *t));
-                self.joined.retain(|(event, _)| *event != incoming.event);
+                tickets.extend(self.joined.iter().filter(|(of, _)| *of == at).map(|(_, ticket)| *ticket));
+                self.joined.retain(|(of, _)| *of != at);
             }
             Class::Notice => _ = self.singles.remove(&single(&incoming)),
             Class::Answer => self.answers -= 1,
@@ -425,7 +430,6 @@ impl Inbox {
         let mut urgent = std::mem::take(&mut self.unheard);
         urgent.extend(self.in_hand.take());
         while let Some((_, incoming)) = self.lists.pop(List::Urgent) {
-            self.singles.remove(&(List::Urgent, incoming.event, None));
             urgent.push(incoming.event);
         }
         self.joined.clear();
@@ -444,5 +448,5 @@ impl Inbox {
 }
 
 fn single(notice: &Incoming) -> Single {
-    (List::Words, notice.event, notice.tag.map(|tag| tag.owner))
+    (notice.event, notice.tag.map(|tag| tag.owner))
 }

@@ -322,16 +322,34 @@ fn while_much_is_asked_for_what_comes_from_outside_waits() {
     assert_eq!([out(&mut inbox), out(&mut inbox)], [Some(Class::Outside), None]);
 }
 
-/// Of what begins and what ends the deployment the order of the last ones counts; a safety event keeps its place.
+/// Of what begins and what ends the deployment the order of the last ones counts; a safety event keeps its place, and is heard once more behind
+/// what came of those before it came again: the last word is a stop, if that came last.
 #[test]
 fn what_begins_and_what_ends_come_in_the_order_in_which_they_came_last() {
     let mut inbox = Inbox::new([]);
     let urgent = |at: usize, last: bool| Incoming { last, ..Incoming::new(Class::Urgent, name(at)) };
-    for (at, last) in [(0, true), (2, false), (1, true), (0, true), (2, false)] {
-        inbox.push(urgent(at, last)).unwrap();
+    let (begins, ends, stops) = ((0, true), (1, true), (2, false));
+    for (came, order) in [
+        (vec![begins, stops, ends, begins], vec![2, 1, 0]),
+        (vec![begins, stops, ends, begins, stops], vec![2, 1, 0, 2]),
+        (vec![stops, stops, ends], vec![2, 1]),
+        (vec![stops, ends, stops, stops, (3, false), begins, stops], vec![2, 1, 3, 0, 2]),
+        (vec![stops, ends, stops, ends], vec![2, 2, 1]),
+    ] {
+        for (number, (at, last)) in (1..).zip(came.iter().copied()) {
+            inbox.push(urgent(at, last).watched(number)).unwrap();
+        }
+        let (mut tickets, mut told) = (Vec::new(), Vec::new());
+        let taken = std::iter::from_fn(|| {
+            let taken = inbox.pop(&mut tickets)?;
+            told.extend(tickets.iter().map(|ticket| (taken.event, *ticket)));
+            Some(taken.event)
+        });
+        assert_eq!(taken.collect::<Vec<_>>(), order.into_iter().map(name).collect::<Vec<_>>(), "{came:?}");
+        told.sort_unstable_by_key(|(_, ticket)| *ticket);
+        let raised: Vec<_> = (1..).zip(&came).map(|(number, (at, _))| (name(*at), number)).collect();
+        assert_eq!(told, raised, "each who raised one is told once");
     }
-    let order: Vec<_> = std::iter::from_fn(|| inbox.pop(&mut Vec::new())).map(|incoming| incoming.event).collect();
-    assert_eq!(order, [name(2), name(1), name(0)]);
 }
 
 /// Who raised something before a stop did not know of it: only what comes after it is heard. What begins and ends the deployment is no such word.
