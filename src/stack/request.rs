@@ -133,9 +133,7 @@ impl Request {
 
     /// An undo by which a coordinator lets go of something is not carried out, and there is no frame of it: it is of a safe configuration that
     /// is still `coming` (the oldest first), and that nobody asks for any more. Visits are left in their order, unless the
-    /// `newest` is meant ([`Claims::newest_is_meant`]).
-    ///
-    /// [`Claims::newest_is_meant`]: super::claims::Claims::newest_is_meant
+    /// `newest` is meant.
     pub fn leaves<'r>(
         &self,
         newest: bool,
