@@ -196,7 +196,7 @@ pub const INBOX_REPORT: usize = 4096;
 /// Events from outside that may wait for a coordinator: a person types, and a program that sends faster than that is told.
 pub const INBOX_OUTSIDE: usize = 1024;
 
-/// Safety events, losses and the like for which an inbox has room from the beginning. There is one of each name at most;
+/// Safety events, losses and the like for which an inbox has room from the beginning. There are two of each name at most;
 /// beyond that it grows, and stays as large.
 pub const INBOX_SINGLES: usize = 64;
 

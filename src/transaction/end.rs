@@ -292,7 +292,7 @@ impl Transaction {
             ..Residual::of(self.reason())
         };
         self.unsettled = unsettled;
-        let beside = self.left_beside(part, &residual, wanted, live);
+        let beside = self.left_beside(part, &residual, wanted, live).filter(|_| remaining.is_empty());
         let clean = remaining.is_empty() && (residual.is_settled() || beside.is_some());
         let missing = self.missing(part, if beside.is_some() { wanted } else { live });
         // Interrupted, each part is to blame for what is left of it.
