@@ -42,7 +42,7 @@ ConfiguratorConf {
     property_set("follower.cart_share", 0.0),
     property_set("cart.enabled", false),
   },
-  brake_again = Configuration { safe = true, port_write("follower.follow", false) },
+  brake_again = Configuration { safe = true, group = "brake", port_write("follower.follow", false) },
   resume      = Configuration { operation_call("arm.acknowledge") },
   clear_faults       = Configuration { operation_call("arm.acknowledge") },
   restart_controller = Configuration { pre_conf_state  = { "follower:unconfigured" },

@@ -171,7 +171,7 @@ ConfiguratorConf {
     property_set("Base_Ctrl.enabled", false),
   },
 
-  brake_again = Configuration { safe = true, description = "what an operator moves in spite of safe_hold; nothing is released by its end",
+  brake_again = Configuration { safe = true, group = "brake", description = "what an operator moves in spite of safe_hold; nothing is released by its end",
     operation_call("youbot.stop"),
   },
 

@@ -16,10 +16,12 @@ local LOSSES = { "e_cmd_watchdog", "e_base_cmd_watchdog", "e_control_lost", "e_w
 
 -- Braked, until somebody says how to go on: `e_reset`, or `e_shutdown`, which is heard in every moment. A stop is heard in every
 -- moment as well, and what was said before it is not done any more: whatever moves meanwhile, since an operator insisted, is braked
--- `again`; one that comes while `safe_hold` is undone applies it again when that is answered. `more`: what is particular to a place.
+-- `again`; one that comes while `safe_hold` is undone does so too, since that may have to wait for what moves, and applies it again when
+-- that is answered. `more`: what is particular to a place.
 local function stopped(more)
   local braked = { "safe_hold.ok", "safe_hold.failed", "safe_hold.broken" }
   local braked_again = { "brake_again.ok", "brake_again.failed", "brake_again.broken" }
+  local not_braked = { "brake_again.failed", "brake_again.broken" }
   local ended = { "brake_again.undone", "brake_again.undo.failed", "brake_again.undo.broken" }
   local not_released = { "safe_hold.undo.failed", "safe_hold.undo.broken" }
   local all = {
@@ -46,9 +48,12 @@ local function stopped(more)
       trans { src = "initial", tgt = "on" },
       trans { src = "on",      tgt = "leaving",         events = { "e_shutdown" } },
       trans { src = "stopped", tgt = "stopped_leaving", events = { "e_shutdown" } },
-      trans { src = "on",              tgt = "stopped", events = STOPS },
-      trans { src = "leaving",         tgt = "stopped", events = STOPS },
-      trans { src = "stopped_leaving", tgt = "stopped", events = STOPS },
+      trans { src = "on",              tgt = "stopped", events = STOPS, effect = "brake_again" },
+      trans { src = "leaving",         tgt = "stopped", events = STOPS, effect = "brake_again" },
+      trans { src = "stopped",         tgt = "stopped", events = STOPS, effect = "brake_again" },
+      trans { src = "stopped_leaving", tgt = "stopped", events = STOPS, effect = "brake_again" },
+      trans { src = "stopped",         tgt = "stopped", events = not_braked },
+      trans { src = "stopped_leaving", tgt = "stopped_leaving", events = not_braked },
     },
     trans { src = "initial",                    tgt = "braking" },
     trans { src = ".braking.staying",           tgt = "waiting",            events = braked },
@@ -60,8 +65,8 @@ local function stopped(more)
     trans { src = "waiting",                    tgt = ".releasing.leaving", events = { "e_shutdown" } },
     trans { src = "again",                      tgt = ".releasing.leaving", events = { "e_shutdown" }, effect = "brake_again.undo" },
     trans { src = "ending",                     tgt = ".releasing.leaving", events = { "e_shutdown" } },
-    trans { src = ".releasing.stopped",         tgt = "braking",            events = { "safe_hold.undone" } },
-    trans { src = ".releasing.stopped_leaving", tgt = ".braking.leaving",   events = { "safe_hold.undone" } },
+    trans { src = ".releasing.stopped",         tgt = "braking",            events = { "safe_hold.undone" }, effect = "brake_again.undo" },
+    trans { src = ".releasing.stopped_leaving", tgt = ".braking.leaving",   events = { "safe_hold.undone" }, effect = "brake_again.undo" },
     trans { src = ".releasing.on",              tgt = "waiting",            events = not_released },
     trans { src = ".releasing.leaving",         tgt = "waiting",            events = not_released },
     trans { src = ".releasing.stopped",         tgt = "again",              events = not_released },

@@ -83,7 +83,7 @@ ConfiguratorConf {
     property_set("Torques.rail_gain", 0.0),
     property_set("Torques.enabled", false),
   },
-  brake_again = Configuration { safe = true, operation_call("Drives.stop") },
+  brake_again = Configuration { safe = true, group = "brake", operation_call("Drives.stop") },
   resume      = Configuration { operation_call("Drives.resume") },
   clear_faults = Configuration { operation_call("Drives.acknowledge") },
   restart_controller = Configuration { description = "the controller from the beginning",

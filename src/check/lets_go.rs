@@ -7,7 +7,7 @@
 use super::universe::Universe;
 use crate::model::codes::{CONF_SAFE_LETS_GO, CONF_SAFE_MOVES};
 use crate::model::{
-    Ask, Call, ChangeKind, Configuration, Deployment, Finding, Findings, MemberRef, Origin, StateEntry, Target,
+    Ask, Call, ChangeKind, Configuration, Deployment, Finding, Findings, MemberRef, Origin, StateEntry, Target, Wanted,
 };
 
 /// What is taken back when a configuration's frame is undone.
@@ -57,16 +57,44 @@ fn taken_back<'c>(
     })
 }
 
-/// What moves when the first one, which is not safe, is taken back: an operation. Whether a run state is taken back depends on where it is applied.
+/// What moves when the first one, which is not safe, is taken back: an operation, or what it has brought to rest and the second one does not.
 fn moves_back(first: &Configuration, second: &Configuration, universe: &Universe) -> Option<Kept> {
-    let (operation, by, at) = taken_back(first, second, universe).find(|(_, by, _)| universe.moves(*by))?;
-    // What moves itself is nothing to call in an emergency.
-    let keep = if universe.moves(operation) {
-        String::new()
-    } else {
-        format!("; or let it call `{operation}` too: it then stays")
+    let called = || {
+        let (operation, by, at) = taken_back(first, second, universe).find(|(_, by, _)| universe.moves(*by))?;
+        // What moves itself is nothing to call in an emergency.
+        let keep = if universe.moves(operation) {
+            String::new()
+        } else {
+            format!("; or let it call `{operation}` too: it then stays")
+        };
+        Some(Kept {
+            at,
+            does: "calls it".to_owned(),
+            back: format!("`{by}` moves, and takes `{operation}` back"),
+            keep,
+        })
     };
-    Some(Kept { at, does: "calls it".to_owned(), back: format!("`{by}` moves, and takes `{operation}` back"), keep })
+    let theirs = brings(second);
+    let starts = |entry: &StateEntry| {
+        let Target::Component(of) = entry.target else { return false };
+        let last = first.pre.iter().chain(first.post.iter()).filter(|other| other.target == entry.target).last();
+        let rests = last.is_some_and(|last| last.state != Wanted::Running);
+        rests && universe.moves_started(of) && !theirs.contains(&entry.target) && !theirs.contains(&Target::Default)
+    };
+    let brought = || {
+        first.pre.iter().chain(first.post.iter()).find(starts).map(|entry| Kept {
+            at: entry.origin,
+            does: "brings it to rest".to_owned(),
+            back: format!("`{}` starts again where it ran before", entry.target),
+            keep: format!("; or let it bring `{}` to rest too", entry.target),
+        })
+    };
+    called().or_else(brought)
+}
+
+/// What a configuration brings to a run state.
+fn brings(configuration: &Configuration) -> Vec<Target> {
+    configuration.pre.iter().chain(configuration.post.iter()).map(|entry| entry.target).collect()
 }
 
 /// What the first one has made safe, and the second one does nothing about.
@@ -86,7 +114,6 @@ fn let_go_of(first: &Configuration, second: &Configuration, universe: &Universe)
             keep: format!("set `{property}` too"),
         })
     };
-    let brings = |of: &Configuration| of.pre.iter().chain(of.post.iter()).map(|entry| entry.target).collect::<Vec<_>>();
     let theirs = brings(second);
     let brought = || {
         let alone = |entry: &StateEntry| !theirs.contains(&entry.target) && !theirs.contains(&Target::Default);

@@ -124,6 +124,11 @@ impl Universe {
         types.filter_map(|ty| ty.operations.get(&operation.member)).any(|of| of.moves)
     }
 
+    /// Whether starting a component moves hardware, as one of the types says.
+    pub fn moves_started(&self, component: ComponentName) -> bool {
+        self.of(component).iter().filter_map(|creation| creation.description.as_ref()).any(|ty| ty.moves.start)
+    }
+
     /// The operations that undo another one, as the types say.
     pub fn undone_by(&self, operation: MemberRef) -> impl Iterator<Item = MemberRef> + '_ {
         let types = self.of(operation.component).iter().filter_map(|creation| creation.description.as_ref());

@@ -8,7 +8,7 @@ use crate::diagnostics::Language;
 use crate::lang;
 use crate::model::codes::CLI_UNKNOWN_TYPE;
 use crate::model::finding::did_you_mean;
-use crate::model::monitor::Condition;
+use crate::model::monitor::{Condition, MONITORS_TYPE};
 use crate::model::{Catalogue, ComponentType, Direction, Effect, GENERIC_INJECTIONS, InjectionParameter};
 use std::path::PathBuf;
 
@@ -69,9 +69,13 @@ impl Run for Args {
                 let only = by_last.next().filter(|_| by_last.next().is_none());
                 let Some(ty) = catalogue.iter().find(|ty| ty.name.as_str() == name).or(only) else {
                     let of_library = |ty: &ComponentType| ty.name.as_str().split('.').next() == Some(&name);
-                    let help = match catalogue.iter().any(|ty| of_library(ty)) {
-                        true => format!("`davit types --library {name}` shows those of the library"),
-                        false => did_you_mean(&name, "types", catalogue.iter().map(|ty| ty.name.as_str())),
+                    let help = if name == MONITORS_TYPE {
+                        format!("what it has are a deployment's own monitors: `davit types FILE {MONITORS_TYPE}`")
+                    } else {
+                        match catalogue.iter().any(|ty| of_library(ty)) {
+                            true => format!("`davit types --library {name}` shows those of the library"),
+                            false => did_you_mean(&name, "types", catalogue.iter().map(|ty| ty.name.as_str())),
+                        }
                     };
                     let message = format!("there is no component type `{name}`");
                     return Err(CommandFailure::no(CLI_UNKNOWN_TYPE, message, help));

@@ -6,6 +6,7 @@ use super::inbox::PoolReply;
 use super::pool::{CallFor, PlatformCall};
 use super::progress::{Progress, StepEnd, StepName};
 use super::running::{OutstandingCall, Purpose, Running};
+use super::suspects::CameBack;
 use crate::limits;
 use crate::model::{Cause, Execution, Outcome, Snapshot, Step};
 use crate::platform::{TimedOutcome, TimedStep};
@@ -272,6 +273,9 @@ impl Engine {
             let Some(at) = self.running.iter().position(|running| running.number == number) else { break };
             let running = self.running.remove(at);
             self.ended(running);
+            if self.returned == CameBack::Later {
+                self.returned = CameBack::Now;
+            }
             did = true;
         }
         did

@@ -10,7 +10,7 @@ use super::progress::{AnswerSink, Progress, ProgressSink};
 use super::request::{Answer, Reason, Request};
 use super::running::{Purpose, Running};
 use super::safety::Safety;
-use super::suspects::Suspects;
+use super::suspects::{CameBack, Suspects};
 use super::switches::Fast;
 use crate::model::{Ask, ConfigId, Configuration, DeploymentLimits, Ident, RunState, Snapshot, Verdict};
 use crate::plan::PlanContext;
@@ -75,7 +75,7 @@ pub(super) struct Engine {
     pub commands: VecDeque<QueuedCommand>,
     pub suspects: Suspects,
     /// A component came back: what is broken may be mended.
-    pub returned: bool,
+    pub returned: CameBack,
     /// What partial frames are left of.
     pub partials: Vec<(FrameId, Arc<super::request::Residual>)>,
     /// Plans that are carried out again, at most so many of each configuration, the one used last at the end.
@@ -124,7 +124,7 @@ impl Engine {
             safety: Safety::default(),
             commands: VecDeque::new(),
             suspects: Suspects::default(),
-            returned: false,
+            returned: CameBack::Nobody,
             partials: Vec::new(),
             switches: FxHashMap::default(),
             confirmations: Confirmations::default(),
@@ -185,7 +185,7 @@ impl Engine {
             if self.revert_unconfirmed() {
                 continue;
             }
-            if self.running.is_empty() && std::mem::take(&mut self.returned) {
+            if self.returned == CameBack::Now {
                 self.mend();
                 continue;
             }
@@ -249,7 +249,7 @@ impl Engine {
         // Nearly never, and to look costs less than to take.
         if self.counts.reports_lost.load(Ordering::Acquire) && self.counts.reports_lost.swap(false, Ordering::AcqRel) {
             self.suspects.report_all(&self.world.system);
-            self.returned = true;
+            self.returned = CameBack::Now;
             let (now, early) = (self.given.clock.now(), !self.current.is_empty());
             self.counts.missed().into_iter().for_each(|event| self.confirmations.came(event, now, early));
         }
@@ -344,7 +344,7 @@ impl Engine {
             PlatformEvent::Faulted { component, .. } => self.suspects.report_fault(component),
             PlatformEvent::Returned { component, .. } => {
                 self.suspects.report(component);
-                self.returned = true;
+                self.returned = CameBack::Now;
                 self.note_quarantine();
             }
             PlatformEvent::Raised { .. } => {}

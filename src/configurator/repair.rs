@@ -6,6 +6,7 @@ use super::pool::PlatformCall;
 use super::progress::Progress;
 use super::request::{Reason, Request};
 use super::running::Running;
+use super::suspects::CameBack;
 use super::teardown::own_plan;
 use crate::limits;
 use crate::model::{ComponentName, RequestId, RunState, Snapshot, Step, Verdict};
@@ -248,11 +249,16 @@ impl Engine {
             let moves = system::diff::moves_any(&steps, &self.world.system);
             let touched: Vec<ComponentName> =
                 components.iter().copied().chain(steps.iter().flat_map(touch::components)).collect();
+            // Who is asked for nothing waits for nobody: it is tried again when that has ended.
+            let later = matches!(by, By::Nobody) && self.is_worked_on(&touched);
+            if later {
+                self.returned = CameBack::Later;
+            }
             let asked = self.may_move(by, &touched);
             if moves && !asked && self.world.stack.safe().next().is_some() {
                 withheld = steps.iter().find(|step| step::moves(step, &self.world.system)).cloned();
             }
-            if !steps.is_empty() && (asked || !moves) {
+            if !steps.is_empty() && (asked || !moves) && !later {
                 let list = in_order(&self.world.system, steps).unwrap_or_default();
                 let plan = own_plan(list, &self.world.system);
                 let spec = Spec { asked_back: asked, ..self.effort([]) };
@@ -328,13 +334,21 @@ impl Engine {
         false
     }
 
-    /// A component came back from a call that had never returned: what could not be mended because of it may be now. By
-    /// itself nothing moves.
+    /// A component came back from a call that had never returned: what could not be mended because of it may be now, beside whatever else is
+    /// under way. By itself nothing moves.
     pub(super) fn mend(&mut self) {
+        self.returned = CameBack::Nobody;
         self.note_quarantine();
         let mut at = 0;
         while at < self.world.broken.len() {
-            if self.world.broken[at].mendable && self.repair(at, By::Nobody).is_ok() {
+            let broken = &self.world.broken[at];
+            let about: Vec<ComponentName> = broken.components.iter().copied().collect();
+            if !broken.mendable {
+                at += 1;
+            } else if self.is_worked_on(&about) {
+                self.returned = CameBack::Later;
+                at += 1;
+            } else if self.repair(at, By::Nobody).is_ok() {
                 if let Some(progress) = &self.given.progress {
                     progress(&Progress::Recovered);
                 }
@@ -342,6 +356,12 @@ impl Engine {
                 at += 1;
             }
         }
+    }
+
+    /// Whether something under way is about one of these.
+    fn is_worked_on(&self, components: &[ComponentName]) -> bool {
+        let mut under_way = self.running.iter().flat_map(|running| running.machine.components());
+        under_way.any(|component| components.contains(&component))
     }
 
     /// Reads what is broken back into the model. False: nobody answered.

@@ -9,6 +9,17 @@ use crate::time::Time;
 use rustc_hash::FxHashSet;
 use std::time::Duration;
 
+/// Whether a component came back from a call that had never returned, and what is broken may be mended since.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum CameBack {
+    /// None has.
+    Nobody,
+    /// One has, and what is under way is about it, or about what is to be done to it: when that has ended it is looked at.
+    Later,
+    /// It is looked at now.
+    Now,
+}
+
 /// A look at a component that was reported faulted.
 struct SuspectLook {
     ticket: PoolTicket,

@@ -278,10 +278,8 @@ fn refuse(cx: &mut Cx, ids: &FxHashMap<String, FileId>, reading: Reading, failur
         None => cx.sources.whole_file(id),
     };
     if failure.syntax {
-        let finding = Finding::error(codes::TEXT_SYNTAX, format!("this is not Lua: {}", failure.message)).at(at);
-        cx.refuse(
-            finding.help("see what stands just before this place: a comma, a bracket or an `end` may be missing"),
-        );
+        let finding = lua::not_lua(&mut cx.sources, id, failure.line, &failure.message);
+        cx.refuse(finding);
         return;
     }
     if let Some(name) = &failure.missing {

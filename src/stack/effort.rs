@@ -50,11 +50,61 @@ pub fn effort(
     let Some(frame) = planned.parts[0].edits.push.as_deref().cloned() else {
         return piecewise(system, configuration, request, at, context);
     };
+    if let Some(anew) = in_force_anew(system, stack, configuration, &planned, &frame, context) {
+        return anew;
+    }
     if !planned.of.is_empty() {
         let steps: &mut Vec<PlannedStep> = Arc::make_mut(&mut planned.steps);
         net::components_side_by_side(steps);
     }
     BestEffort { planned, frame: Frame { left: request.gone, ..frame }, troubles: Vec::new() }
+}
+
+/// What is in force whole, and would bring something back to its run state of before for a moment to be done anew. Its demands are met; what it had
+/// called before that one came to rest is not called again, and all else that it calls is. A motor that it has braked and stopped is not
+/// started for another brake.
+fn in_force_anew(
+    system: &System,
+    stack: &Stack,
+    configuration: &Configuration,
+    planned: &Planned,
+    new: &Frame,
+    context: &PlanContext,
+) -> Option<BestEffort> {
+    let [old] = planned.popped.as_slice() else { return None };
+    let moved = planned.steps.iter().filter(|planned| matches!(planned.step, Step::State { .. }));
+    let moved: FxHashSet<ComponentName> = moved.map(|planned| planned.step.component()).collect();
+    let at = stack.frames.iter().position(|frame| frame.id == old.id)?;
+    // What others have done to it since may be what it is asked for again.
+    let since = stack.frames[at + 1..].iter().any(|frame| share::meet(&moved, &frame.footprint));
+    let whole = old.configuration == configuration.id && !old.partial && !since;
+    if moved.is_empty() || !whole || !share::free(&stack.frames, at)?.keeps_calls_only() {
+        return None;
+    }
+    let mut steps = Vec::new();
+    for piece in pieces(configuration) {
+        let plan = plan_on(&mut Overlay::new(system), &piece, context).ok()?;
+        for planned in plan.steps.iter() {
+            match &planned.step {
+                Step::Operation(call) if moved.contains(&call.operation.component) => {}
+                Step::Operation(_) => steps.push(planned.clone()),
+                _ => return None,
+            }
+        }
+    }
+    for (id, planned) in (0..).zip(&mut steps) {
+        (planned.id, planned.wave) = (id, 0);
+    }
+    net::components_side_by_side(&mut steps);
+    let Frame { requester, at, scope, left, id, .. } = new.clone();
+    let frame = Frame { requester, at, scope, left, id, ..(**old).clone() };
+    let mut part = planned.parts[0].clone();
+    part.range = 0..u32::try_from(steps.len()).expect("fewer steps than that");
+    part.edits.push = Some(Arc::new(frame.clone()));
+    part.frame.clone_from(&part.edits.push);
+    let (steps, parts) = (Arc::new(steps), vec![part]);
+    let planned = Planned { steps, parts, of: Vec::new(), whole: Vec::new(), ..planned.clone() };
+    Some(BestEffort { planned, frame, troubles: Vec::new() })
 }
 
 /// A configuration without what is about components that are not there.
@@ -118,14 +168,18 @@ fn rest_of(frame: &Arc<Frame>, hand: &HandOver) -> Arc<Frame> {
     Arc::new(Frame { inverse, saved, footprint, ..(**frame).clone() })
 }
 
-/// A frame with what an older one did as well. What both have called is taken back once.
+/// A frame with what an older one did as well. What both have called, or brought to a run state, is taken back once, where the older one does:
+/// the newer one may have done it in its place, and each of them has it.
 fn taken_over(old: &Frame, new: &Frame) -> Frame {
-    let own = list(new);
-    let again = |item: &DraftStep| matches!(item.step, Step::Operation(_)) && own.iter().any(|o| o.step == item.step);
-    let rest: Vec<DraftStep> = list(old).into_iter().filter(|item| !again(item)).collect();
-    let old = Frame { inverse: Inverse::List(Arc::new(rest)), ..old.clone() };
+    let theirs = list(old);
+    let again = |item: &DraftStep| {
+        let once = matches!(item.step, Step::Operation(_) | Step::State { .. });
+        once && theirs.iter().any(|other| other.step == item.step)
+    };
+    let own: Vec<DraftStep> = list(new).into_iter().filter(|item| !again(item)).collect();
+    let new = &Frame { inverse: Inverse::List(Arc::new(own)), ..new.clone() };
     let (group, scope, left, partial) = (new.group, new.scope, new.left, new.partial);
-    Frame { group, scope, left, partial, parts: Arc::default(), ..squash(&old, new) }
+    Frame { group, scope, left, partial, parts: Arc::default(), ..squash(old, new) }
 }
 
 /// The frame of a safe configuration of which these steps were not done: it takes back what was.

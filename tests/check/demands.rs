@@ -519,6 +519,7 @@ fn what_moves_when_something_safe_takes_its_place_is_warned_of() {
             "types:\n",
             "types:
   Valve:
+    moves: start
     properties: { gain: { type: float, default: 1.0 } }
     operations: { turn: { effect: { undo: back } }, back: { moves: true, effect: { undo: turn } } }
 ",
@@ -537,6 +538,13 @@ fn what_moves_when_something_safe_takes_its_place_is_warned_of() {
     assert_eq!(of(turned, ""), [""; 0]);
     assert_eq!(of("group = \"g\", property_set(\"a.gain\", 2.0),", "group = \"g\","), [""; 0]);
     assert_eq!(of(turned, "group = \"h\","), [""; 0]);
+    // What it has brought to rest would start again, unless the safe one brings it to rest as well.
+    let rests = "group = \"g\", post_conf_state = { \"a:stopped\" },";
+    let told = of(rests, "group = \"g\",");
+    assert!(told.len() == 1 && told[0].ends_with("taken back: `a` starts again where it ran before"), "{told:?}");
+    assert_eq!(of(rests, rests), [""; 0]);
+    assert_eq!(of(rests, "group = \"g\", post_conf_state = { \"_default:stopped\" },"), [""; 0]);
+    assert_eq!(of("group = \"g\", post_conf_state = { \"a:running\" },", "group = \"g\","), [""; 0]);
 }
 
 /// What others may change meanwhile is not judged, and that is said.

@@ -101,6 +101,112 @@ fn an_emergency_that_is_heard_again_lets_nothing_go() {
     }
 }
 
+/// What it has braked and stopped is not started for another brake: heard again, it does to that nothing, and its end leads back to where it began.
+#[test]
+fn an_emergency_that_is_heard_again_starts_nothing() {
+    let types = DEPLOYMENT.replace("  Motor:", "  Lamp: { operations: { warn: { effect: none } } }\n  Motor:");
+    let configurations = CONFIGURATIONS
+        .replace(
+            "[{ create: { component: m, type: Motor } }]",
+            "[{ create: { component: m, type: Motor } }, { create: { component: l, type: Lamp } }]",
+        )
+        .replace("[\"m:running\"]", "[\"m:running\", \"l:running\"]")
+        .replace(
+            "operation: m.brake } }]",
+            "operation: m.brake } }, { operation_call: { operation: l.warn } }], post_conf_state: [\"m:stopped\"]",
+        );
+    let coordinator =
+        COORDINATOR.replace("[ease.failed, ease.broken]", "[e_bad]").replace("on: { config: ease }", "on: {}");
+    let script = "deploy('deployment.yaml')
+        local function told(answer)
+          local steps = {}
+          for _, it in ipairs(log()) do
+            if it.answer == answer then steps = {} for _, done in ipairs(it.steps) do table.insert(steps, done.step) end end
+          end
+          say(answer .. ': ' .. table.concat(steps, ', '))
+        end
+        raise('e_estop') wait(0.3) told('hold.ok') raise('e_estop') wait(0.3) told('hold.ok')
+        say(state('m') .. ', ' .. #drift() .. ' differ, ' .. #stack() .. ' frames')
+        EVENT wait(1) told('hold.undone') shutdown()";
+    for (group, held, event) in [
+        ("group: g,", "entry: hold", "raise('e_shutdown')"),
+        ("group: g,", "config: hold", "raise('e_reset')"),
+        ("", "entry: hold, exit: hold.undo", "raise('e_reset')"),
+    ] {
+        let demo = Demo::new();
+        demo.write("deployment.yaml", &types);
+        demo.write(
+            "c.yaml",
+            &configurations
+                .replace(
+                    "GROUP changes: [{ operation_call: { operation: m.release",
+                    "changes: [{ operation_call: { operation: m.release",
+                )
+                .replace("GROUP", group),
+        );
+        demo.write("k.yaml", &coordinator.replace("HELD", held));
+        demo.write("story.lua", &script.replace("EVENT", event));
+        let ran = demo.run(&["run", "story.lua", "--clock", "simulated", "--quiet"]);
+        let told: Vec<&str> = ran.out.lines().collect();
+        let whole = "hold.ok: operation_call l.warn, operation_call m.brake, stop m";
+        let [first, second, stands, back] = told.as_slice() else { panic!("{told:?}{}", ran.err) };
+        let sorted = |line: &str| {
+            line.replace(
+                "operation_call m.brake, operation_call l.warn",
+                "operation_call l.warn, operation_call m.brake",
+            )
+        };
+        assert_eq!(sorted(first), whole, "{group} {held}");
+        // Where the state is left first, what it had called is called again as it stands.
+        let calls = if group.is_empty() {
+            "hold.ok: operation_call l.warn, operation_call m.brake"
+        } else {
+            "hold.ok: operation_call l.warn"
+        };
+        assert_eq!(sorted(second), calls, "{group} {held}");
+        assert_eq!(*stands, "stopped, 0 differ, 2 frames", "{group} {held}");
+        assert_eq!(*back, "hold.undone: start m, operation_call m.release", "{group} {held}");
+    }
+}
+
+/// Another one of its group takes over what the first one has still to do, and that is taken back once.
+#[test]
+fn what_one_does_in_the_place_of_another_one_is_taken_back_once() {
+    let demo = Demo::new();
+    demo.write("deployment.yaml", DEPLOYMENT);
+    let own = |id: &str| {
+        format!(
+            "  {id}: {{ safe: true, group: g, changes: [{{ operation_call: {{ operation: m.brake }} }}], post_conf_state: [\"m:stopped\"] }}\n"
+        )
+    };
+    let build = CONFIGURATIONS.lines().take(2).collect::<Vec<_>>().join("\n");
+    demo.write("c.yaml", &format!("{build}\n{}{}", own("hold"), own("halt")));
+    let coordinator = COORDINATOR
+        .replace("held: { HELD }", "held: { entry: hold }")
+        .replace("other: { HELD }", "other: { entry: halt }\n        easing: { entry: halt.undo }")
+        .replace("on: { config: ease }", "on: {}")
+        .replace("[ease.failed, ease.broken]", "[e_bad]")
+        .replace(
+            "- { src: other, tgt: failed, events: [e_reset, hold.failed, hold.broken] }",
+            "- { src: other, tgt: easing, events: [e_reset] }
+        - { src: other, tgt: other, events: [halt.failed, halt.broken] }
+        - { src: easing, tgt: failed, events: [halt.undone, halt.undo.failed, halt.undo.broken] }
+        - { src: easing, tgt: held, events: [e_estop] }",
+        );
+    demo.write("k.yaml", &coordinator);
+    let script = "deploy('deployment.yaml', { replay = true }) raise('e_start') wait(0.1)
+        fault('operation_call m.brake', 'slow', 1, 0.5) raise('e_estop') wait(0.1) raise('e_other') wait(2)
+        say(state('m') .. ', ' .. #drift() .. ' differ, ' .. #stack() .. ' frames')
+        raise('e_reset') wait_answer('halt.undone', 1)
+        say(state('m') .. ', ' .. #drift() .. ' differ, ' .. #stack() .. ' frames')
+        raise('e_shutdown') wait_state('idle', 1)";
+    demo.write("story.lua", script);
+    let ran = demo.run(&["run", "story.lua", "--clock", "simulated", "--quiet"]);
+    let told: Vec<&str> = ran.out.lines().collect();
+    let whole = ["stopped, 0 differ, 2 frames", "running, 0 differ, 1 frames"];
+    assert_eq!((told.as_slice(), ran.code), (&whole[..], 0), "{}", ran.err);
+}
+
 /// An emergency comes again while the first one is still being applied: one frame of its group is in force, and its undo lets all go.
 #[test]
 fn an_emergency_that_comes_while_it_is_being_heard_leaves_one_frame() {

@@ -215,6 +215,23 @@ fn configurations_in_lua() {
     let broken = replaced("c.lua", LUA, "timeout = 0.5,", "timeout = 0.5;;");
     assert_eq!(codes(&broken), ["text::syntax 2:3"]);
     assert!(broken.unreadable);
+    // A word of Lua itself, in each kind of file.
+    let misspelt = load(&[("c.lua", &format!("  lcoal rate = 0.5\n{LUA}"))], &LoadOptions::default());
+    answers.one(&misspelt, ("local", "lcoal"), "text::syntax 1:3", "`local`");
+    let coordinator = COORDINATOR.replacen("return state", "retunr state", 1);
+    assert_ne!(coordinator, COORDINATOR);
+    let misspelt = load(&[("k.lua", &coordinator), ("c.lua", LUA)], &LoadOptions::default());
+    answers.one(&misspelt, ("return", "retunr"), "text::syntax 1:1", "`return`");
+}
+
+/// What is meant to be true or false, and is neither.
+#[test]
+fn what_is_nearly_true_or_false_is_told() {
+    let mut answers = Answers::default();
+    for (written, meant) in [("treu", "true"), ("Flase", "false"), ("yes", "true"), ("off", "false")] {
+        let text = YAML.replacen("    timeout: 0.5", &format!("    safe: {written}\n    timeout: 0.5"), 1);
+        answers.one(&yaml(&text), ("safe: true", written), "text::wrong_type 3:11", &format!("`{meant}`"));
+    }
 }
 
 const YAML: &str = "\

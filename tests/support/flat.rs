@@ -61,7 +61,7 @@ impl Renamed<'_> {
         if text == "sim0" {
             return format!("{robot}{text}");
         }
-        if self.configurations.iter().any(|id| id == first) || text == "profile" {
+        if self.configurations.iter().any(|id| id == first) || ["profile", "brake"].contains(&text) {
             return format!("{robot}{text}");
         }
         match text.strip_prefix("e_") {

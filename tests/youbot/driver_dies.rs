@@ -39,3 +39,11 @@ fn an_arm_that_could_not_unfold_is_held_when_its_drives_are_to_go_off() {
     let ended = end.ended.expect("it deployed something");
     assert!(ended.is_clean() && !ended.is_orderly(), "{ended:?}");
 }
+
+/// A call that comes back after its deadline is mended beside whatever the other robot does.
+#[test]
+fn a_call_that_comes_back_is_mended_while_the_other_one_is_busy() {
+    let end = script(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/youbot/returned.lua"), &[]);
+    let ended = end.ended.expect("it deployed something");
+    assert!(ended.is_clean() && ended.is_orderly(), "{ended:?}");
+}

@@ -129,7 +129,6 @@ fn every_state_hears_every_stop() {
         ".losing.staying",
         ".again",
         ".ending.stopped",
-        ".releasing.stopped",
         "unwiring.braked.braking",
         "unwiring.braked.waiting",
         "destroying.braked.braking",

@@ -149,3 +149,55 @@ fn unwatched_it_is_stopped_on_the_way_down_too() {
         unwatched_on_the_way_down(name);
     }
 }
+
+/// A stop behind the order to let go, while an operator moves what is stopped: it brakes that at once, and does not wait until nothing moves any
+/// more so that it can be let go of.
+fn moved_while_it_is_let_go_of(place: &str, lets_go: &str) {
+    let what = format!("{place}, {lets_go}");
+    let live = Live::with_hand("youbot_arm", HAND);
+    match place {
+        "halted" => {
+            live.raise("e_start");
+            live.until_state("deploying.unfolding", 5.0);
+            live.run(0.8);
+        }
+        _ => {
+            live.bring_up();
+            live.until_state("copying", 5.0);
+        }
+    }
+    if place == "lowering" {
+        live.raise("e_shutdown");
+        live.until_state("parking", 1.0);
+        live.run(0.3);
+    }
+    live.raise("e_estop");
+    stays(&live, &format!("{place}.waiting"), &what);
+    live.rows();
+    insists(&live, "park");
+    live.run(0.4);
+    live.raise(lets_go);
+    live.run(0.2);
+    // In `fault` the drives' errors are cleared first, which waits as well.
+    let waits = live.place().contains("releasing") || live.place().ends_with("fault.clearing");
+    assert!(waits, "{what}: in {}\n{}", live.place(), live.story(live.now() - 1.0));
+    assert!(live.rows().last().unwrap().speed.norm() > 0.02, "{what}: it does not move");
+    live.raise("e_estop");
+    stays(&live, &format!("{place}.waiting"), &what);
+    // On the way back nobody has asked for what would unfold the arm again, which an operator has folded: that is for the operator to undo.
+    if place != "halted" {
+        live.raise("e_shutdown");
+        live.until_state("idle", 30.0);
+    }
+    assert_eq!(live.first("e_arm_dropped", 0.0), None, "{what}");
+    live.clock.shutdown();
+}
+
+#[test]
+fn a_stop_brakes_what_is_moved_while_it_is_let_go_of() {
+    for place in ["fault", "lowering", "halted"] {
+        for lets_go in ["e_reset", "e_shutdown"] {
+            moved_while_it_is_let_go_of(place, lets_go);
+        }
+    }
+}

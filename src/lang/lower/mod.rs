@@ -12,7 +12,7 @@ mod simulated;
 pub mod types;
 
 use super::tree::{Cx, Entry, Fields, Kind, Node};
-use crate::model::finding::did_you_mean;
+use crate::model::finding::{did_you_mean, nearest};
 use crate::model::names::NameError;
 use crate::model::{Finding, Ident, Origin, Value, codes};
 use std::str::FromStr;
@@ -108,11 +108,21 @@ pub fn text(cx: &mut Cx, node: &Node, what: &str, example: &str) -> Option<Strin
 
 /// A truth value.
 pub fn truth(cx: &mut Cx, node: &Node, what: &str, example: &str) -> Option<bool> {
-    let Kind::Bool(v) = node.kind else {
-        cx.wrong(node, what, "true or false", example);
-        return None;
+    let meant = match &node.kind {
+        Kind::Bool(v) => return Some(*v),
+        // What YAML once took for one is told as well.
+        Kind::Str(text) => match text.to_lowercase().as_str() {
+            "yes" | "on" => Some("true"),
+            "no" | "off" => Some("false"),
+            text => nearest(text, ["true", "false"]),
+        },
+        _ => None,
     };
-    Some(v)
+    match meant {
+        Some(meant) => cx.wrong_so(node, what, "true or false", &format!("did you mean `{meant}`?")),
+        None => cx.wrong(node, what, "true or false", example),
+    }
+    None
 }
 
 /// A finite number.

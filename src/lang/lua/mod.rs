@@ -10,6 +10,7 @@ mod logic;
 mod monitors;
 mod recorder;
 mod sandbox;
+mod syntax;
 
 use super::files::Sources;
 use super::params::Params;
@@ -23,6 +24,7 @@ use recorder::{Recorder, SharedRecorder};
 use std::cell::RefCell;
 use std::path::PathBuf;
 use std::rc::Rc;
+pub use syntax::not_lua;
 
 /// What a Lua file made.
 pub struct Made {

@@ -226,11 +226,8 @@ impl Recorder {
                     finding.help("nothing that Davit reads needs so many levels: a bracket is probably not closed"),
                 );
             } else {
-                let finding = Finding::error(codes::TEXT_SYNTAX, format!("this is not Lua: {message}")).at(at);
-                self.cx.refuse(
-                    finding
-                        .help("see what stands just before this place: a comma, a bracket or an `end` may be missing"),
-                );
+                let finding = super::syntax::not_lua(&mut self.cx.sources, self.reading.file, line, &message);
+                self.cx.refuse(finding);
             }
         } else {
             // A name that is not defined makes other errors in its wake; the finding about it says enough.
