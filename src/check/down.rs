@@ -92,7 +92,7 @@ impl Graph<'_, '_> {
     }
 
     /// What to do about a state from which no way leads down: what ends the deployment may lead on from there, to nowhere.
-    fn leads_nowhere(&mut self, at: u32) -> String {
+    pub(super) fn leads_nowhere(&mut self, at: u32) -> String {
         let (leaf, shutdown) = (self.states[at as usize].leaves[0], self.product.deployment.shutdown.event);
         let member = &mut self.product.members[0];
         let event = member.chart.event(shutdown);
@@ -109,10 +109,14 @@ impl Graph<'_, '_> {
     /// From which states such edges lead to *down*, or to where it is not followed, or to nothing that is known.
     fn reaching_down(&self, arrives: &[bool], counts: impl Fn(usize, &Edge) -> bool) -> Vec<bool> {
         let forced = |state: &ProductState| self.product.worlds.top(state.world).is_some();
-        let mut reaches = arrives.to_vec();
         // What the broken ends lead to is taken away by force: that is no way down of an intact system.
+        let counts = |number: usize, edge: &Edge| !forced(&self.states[edge.to as usize]) && counts(number, edge);
+        self.leading_to(arrives.to_vec(), counts)
+    }
+
+    /// These states, and from which others such edges lead to them.
+    pub(super) fn leading_to(&self, mut reaches: Vec<bool>, counts: impl Fn(usize, &Edge) -> bool) -> Vec<bool> {
         let mut open: Vec<u32> = (0u32..).zip(&reaches).filter(|(_, reaches)| **reaches).map(|(at, _)| at).collect();
-        open.retain(|at| !forced(&self.states[*at as usize]));
         while let Some(at) = open.pop() {
             for number in self.incoming().of(at) {
                 let edge = &self.edges[*number as usize];
@@ -180,6 +184,7 @@ impl Graph<'_, '_> {
         let stale = self.spread_from(heard, |number, edge| stops(edge.to) && bars[number] == Some(Barred::Closed));
         let stale = (0u32..).zip(stale).filter(|(_, stale)| *stale).map(|(at, _)| at);
         let begun: Vec<u32> = stale.chain(begun).collect();
+        let begun_all = begun.clone();
         let comes = self.spread_from(begun, |number, edge| stops(edge.to) && bars[number] != Some(Barred::Closed));
         // Where nothing has failed what leads down by a failure alone, beside what may go well, is no way to count on.
         let mut goes_well = vec![false; self.states.len()];
@@ -218,6 +223,8 @@ impl Graph<'_, '_> {
             }
             (before, before_well) = (after, after_well);
         }
+        let alone = self.led_by_emergency_alone(&begun_all, arrives, &bars);
+        found_at(self, alone, !self.product.knows_less(), &|graph: &mut Self, at| graph.waits_for_an_emergency(at));
         if !self.product.never_down {
             let slow = self.slow(&bars);
             let tell = |graph: &mut Self, at| graph.lasts_too_long(at, slow.always[&at]);

@@ -113,6 +113,7 @@ mod undriven;
 mod unhandled;
 mod universe;
 mod unknown;
+mod unled;
 mod unwatched;
 mod up_time;
 mod verdict;

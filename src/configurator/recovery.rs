@@ -164,7 +164,7 @@ impl Engine {
                 }
                 continue;
             }
-            let partial = |frame: &&Arc<Frame>| frame.partial && !frame.safe;
+            let partial = |frame: &&Arc<Frame>| self.world.stack.is_in_part(frame) && !frame.safe;
             let Some(frame) = self.world.stack.frames().iter().rev().find(partial).cloned() else {
                 break;
             };

@@ -7,7 +7,7 @@ use super::engine::Engine;
 use super::request::{Reason, Request};
 use super::running::{Purpose, Running};
 use super::safety::{Troubled, coming};
-use crate::model::{Ask, ConfigId, Step, Target, Verdict};
+use crate::model::{Ask, ConfigId, RequestId, Step, Target, Verdict};
 use crate::stack::{BestEffort, Frame, Planned, Residual, SafeEnd, Stack, components, effort};
 use crate::system::touch::{Slot, slot};
 use crate::system::{System, step, touch};
@@ -96,14 +96,19 @@ impl Engine {
         self.advance(0);
     }
 
-    /// The steps that safe configurations under way have still to do about what this one is about, and their numbers.
+    /// The steps that safe configurations under way have still to do about what this one is about, and their numbers. Where it is the same one, and
+    /// takes the place of that, values and run states that are out are no such: nobody knows yet whether they come to be, and it has them done once
+    /// more.
     fn earlier_safe(&self, request: &Request) -> (Vec<Step>, SmallVec<[u64; 1]>) {
         let about = self.given.claims.of([request]);
         let (mut steps, mut numbers) = (Vec::new(), SmallVec::new());
         for other in self.running.iter().rev().filter(|other| other.is_safe()) {
             let Purpose::Safe(safe) = &other.purpose else { continue };
             if self.given.claims.of([&safe.0]).meets(&about) {
-                steps.extend(other.machine.open_steps().cloned());
+                let anew = safe.0.ask == request.ask
+                    && matches!(request.ask, Ask::Apply(id) if self.given.claims.replaces(id, id));
+                let counts = |open: &OpenStep| !(anew && open.begun) || matches!(open.step, Step::Operation(_));
+                steps.extend(other.machine.still_to_do().filter(counts).map(|open| open.step));
                 numbers.push(other.number);
             }
         }
@@ -239,14 +244,27 @@ impl Engine {
                 }
                 _ => false,
             };
+            // But for what these do themselves, or others between them.
+            let does = |other: &Running, step: &Step| {
+                let between = |one: &&Running| other.after.contains(&one.number) && one.after.contains(&number);
+                let mut doing = std::iter::once(other).chain(self.running.iter().filter(between));
+                doing.any(|one| one.machine.all_steps().iter().any(|(_, own)| own == step))
+            };
             let later = self.running.iter().filter(|other| other.after.contains(&number)).filter(about);
-            let served: Vec<_> = later.flat_map(|other| other.serves.iter().copied()).collect();
-            for troubled in self.safety.troubles.iter_mut().filter(|other| served.contains(&other.request)) {
+            let mut left: Vec<(RequestId, Vec<Step>)> = Vec::new();
+            for other in later {
+                let steps: Vec<Step> = missed.iter().filter(|step| !does(other, step)).cloned().collect();
+                if !steps.is_empty() {
+                    left.extend(other.serves.iter().map(|request| (*request, steps.clone())));
+                }
+            }
+            for troubled in &mut self.safety.troubles {
+                let Some((_, steps)) = left.iter().find(|(request, _)| *request == troubled.request) else { continue };
                 let why = Reason::Broken(part.residual.clone());
                 if !troubled.reasons.contains(&why) {
                     troubled.reasons.push(why);
                 }
-                troubled.missed.extend(missed.iter().cloned());
+                troubled.missed.extend(steps.iter().cloned());
             }
         }
         let reason = match broken {

@@ -276,11 +276,11 @@ impl Stack {
         self.is_buried(id, None) || self.frames.iter().any(|frame| frame.configuration == id && !frame.partial)
     }
 
-    /// Whether of a frame only a part is in force. Where something safe was applied once more, and whole, no part of it is missing.
+    /// Whether of a frame only a part is in force. Where it was applied once more, and whole, no part of it is missing.
     pub fn is_in_part(&self, frame: &Frame) -> bool {
         let anew =
             |newer: &&Arc<Frame>| newer.id > frame.id && newer.configuration == frame.configuration && !newer.partial;
-        frame.partial && !(frame.safe && self.frames.iter().any(|newer| anew(&newer)))
+        frame.partial && !self.frames.iter().any(|newer| anew(&newer))
     }
 
     /// The safe configurations in force.

@@ -45,12 +45,7 @@ impl Transaction {
         forward.failures.iter().map(|(i, _)| &forward.list[*i as usize])
     }
 
-    /// The steps of a best effort that are not over.
-    pub fn open_steps(&self) -> impl Iterator<Item = &Step> {
-        self.forward.open().map(|(planned, _)| &planned.step)
-    }
-
-    /// The same, each with whether it is out.
+    /// The steps of a best effort that are not over, each with whether it is out.
     pub fn still_to_do(&self) -> impl Iterator<Item = OpenStep> + '_ {
         self.forward.open().map(|(planned, begun)| OpenStep { step: planned.step.clone(), begun })
     }

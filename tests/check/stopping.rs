@@ -711,3 +711,45 @@ fn a_shutdown_that_waits_for_what_nothing_raises_is_told() {
     assert_eq!(finding["severity"], "warning");
     assert!(said("'e_yes', 'e_after(1.0)'").of("deploy::by_hand").is_empty());
 }
+
+/// A step of something safe fails, and its coordinator waits from then on for an answer that it has had: of the system nothing is known there, but of
+/// what is waited for there is.
+#[test]
+fn who_is_not_led_down_behind_something_safe_that_failed_is_told() {
+    let configurations = "base = Configuration { create('a', 'Drive') },
+        dim = Configuration { safe = true, property_set('a.gain', 0.0) },";
+    let coordinator = |heard: &str| {
+        format!(
+            "idle = state {{}}, making = state {{ entry = 'base' }}, up = state {{}}, dimmed = state {{}},
+             dimming = state {{ entry = 'dim', waits = state {{}}, going = state {{}},
+               trans {{ src = 'initial', tgt = 'waits' }}, trans {{ src = 'waits', tgt = 'going', events = {{ 'e_shutdown' }} }} }},
+             lighting = state {{ entry = 'dim.undo' }}, leaving = state {{ entry = 'base.undo' }},
+             trans {{ src = 'initial', tgt = 'idle' }},
+             trans {{ src = 'idle', tgt = 'making', events = {{ 'e_start' }} }},
+             trans {{ src = 'making', tgt = 'up', events = {{ 'base.ok' }} }},
+             trans {{ src = 'making', tgt = 'leaving', events = {{ 'base.failed', 'base.broken', 'e_shutdown' }} }},
+             trans {{ src = 'up', tgt = 'dimming', events = {{ 'e_dim' }} }},
+             trans {{ src = 'up', tgt = 'leaving', events = {{ 'e_shutdown' }} }},
+             trans {{ src = 'dimming.waits', tgt = 'dimmed', events = {{ {heard} }} }},
+             trans {{ src = 'dimming.going', tgt = 'lighting', events = {{ 'dim.ok', 'dim.failed', 'dim.broken' }} }},
+             trans {{ src = 'dimmed', tgt = 'lighting', events = {{ 'e_shutdown' }} }},
+             trans {{ src = 'lighting', tgt = 'leaving', events = {{ 'dim.undone', 'dim.undo.failed', 'dim.undo.broken' }} }},
+             trans {{ src = 'leaving', tgt = 'idle', events = {{ 'base.undone' }} }},
+             trans {{ src = 'leaving', tgt = 'leaving', events = {{ 'base.undo.failed', 'base.undo.broken' }} }},"
+        )
+    };
+    let whole = Small::new(configurations, &coordinator("'dim.ok', 'dim.failed', 'dim.broken'"), "").check();
+    assert!(whole.of("coord::no_way_down").is_empty(), "{:#}", whole.0);
+    let small = Small::new(configurations, &coordinator("'dim.ok', 'dim.failed'"), "");
+    let said = small.check();
+    let message = only(&said, "coord::no_way_down")["message"].as_str().unwrap();
+    assert_eq!(message, "from `root.dimming.waits` no way leads down, where something safe could not be done whole");
+    // So it is.
+    small.demo.write(
+        "s.lua",
+        "deploy('small.yaml') fault('property_set a.gain', 'fail', 1) raise('e_dim') wait(1) raise('e_shutdown') wait(1)
+         say(active()[#active()])",
+    );
+    let ran = small.demo.run(&["run", "s.lua", "--clock", "simulated", "--platform", "simulated", "--quiet"]);
+    assert_eq!((ran.out.trim(), ran.code), ("root.dimming.going", 4), "{}", ran.err);
+}

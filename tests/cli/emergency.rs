@@ -452,3 +452,20 @@ fn one_in_part_takes_the_place_of_what_is_being_replaced_or_undone() {
     let told = said(&demo, &story(undo, "e_end"));
     assert_eq!(told, ["stopped 0.0 0.1 0 build stop", "reset nil nil 0 build"]);
 }
+
+/// What ends the deployment leads to where nothing but an emergency leads on: nobody brings that about in order to end it.
+#[test]
+fn an_emergency_is_no_way_down() {
+    let demo = belt();
+    assert_eq!(found(&demo, "coord::no_way_down"), [Json::Null; 0]);
+    demo.replace(
+        "belt/coordinator.yaml",
+        "{ src: up, tgt: down, events: [e_end] }",
+        "{ src: up, tgt: failed, events: [e_end] }",
+    );
+    let told = found(&demo, "coord::no_way_down");
+    let message = "from `root.failed` only a second `e_end`, or `e_stop`, which is for an emergency, leads on, and it is raised once";
+    assert!(told.len() == 1 && told[0]["message"] == message, "{told:#?}");
+    let story = "deploy('deployment.yaml') raise('e_end') wait(1) say(active()[#active()]) raise('e_end') wait(1) say(active()[#active()])";
+    assert_eq!(said(&demo, story), ["root.failed", "root.off"]);
+}

@@ -169,6 +169,47 @@ fn an_emergency_that_is_heard_again_starts_nothing() {
     }
 }
 
+/// What is out of the first one may never come to be: who asks once more has it done once more, and is answered for that alone. It is taken back
+/// once, however often it was asked for.
+#[test]
+fn what_is_out_is_done_once_more() {
+    for (fault, times) in [("stop m", 2), ("stop m", 3), ("property_set m.power", 2), ("property_set m.power", 3)] {
+        let demo = Demo::new();
+        let power = "    actuator: true\n    properties: { power: { type: float, default: 1.0, tunable: always } }\n";
+        demo.write("deployment.yaml", &DEPLOYMENT.replace("    actuator: true\n", power));
+        let calm = "operation: m.brake } }, { property_set: { property: m.power, value: 0.0 } }], post_conf_state: [\"m:stopped\"]";
+        let configurations = CONFIGURATIONS.replace("operation: m.brake } }]", calm).replace(
+            "GROUP changes: [{ operation_call: { operation: m.b",
+            "group: g, changes: [{ operation_call: { operation: m.b",
+        );
+        demo.write("c.yaml", &configurations.replace("GROUP", ""));
+        let coordinator = COORDINATOR.replace("HELD", "entry: hold").replace("[ease.failed, ease.broken]", "[e_bad]");
+        let coordinator =
+            coordinator.replace("on: { config: ease }", "on: {}").replace(", hold.failed, hold.broken]", "]");
+        let hears = "        - { src: held, tgt: held, events: [e_estop] }\n";
+        let coordinator = coordinator.replace(
+            hears,
+            &format!("{hears}        - {{ src: held, tgt: other, events: [hold.failed, hold.broken] }}\n"),
+        );
+        demo.write("k.yaml", &coordinator.replace("other: { entry: hold }", "other: {}"));
+        let script = format!(
+            "deploy('deployment.yaml', {{ replay = true }}) raise('e_start') wait(0.1)
+             fault('{fault}', 'lost', 1)
+             for i = 1, {times} do raise('e_estop') wait(0.1) end wait(20)
+             for _, it in ipairs(log()) do if it.answer and it.answer:find('^hold') then say(it.answer) end end
+             say(state('m') .. ' ' .. property('m.power') .. ' ' .. #drift() .. ' ' .. #stack())
+             raise('e_shutdown') wait_state('idle', 1) say(#stack())"
+        );
+        demo.write("story.lua", &script);
+        let ran = demo.run(&["run", "story.lua", "--clock", "simulated", "--quiet"]);
+        let mut whole = vec!["hold.broken"];
+        whole.extend((1..times).map(|_| "hold.ok"));
+        whole.extend(["stopped 0.0 0 2", "0"]);
+        let told: Vec<&str> = ran.out.lines().collect();
+        assert_eq!((told, ran.code), (whole, 0), "{fault} {times}: {}", ran.err);
+    }
+}
+
 /// Another one of its group takes over what the first one has still to do, and that is taken back once.
 #[test]
 fn what_one_does_in_the_place_of_another_one_is_taken_back_once() {
@@ -372,7 +413,7 @@ fn what_failed_of_both_is_told_once_of_each() {
         "s.lua",
         &format!(
             "deploy('{conveyor}') wait(0.5)
-             fault('port_write belt.speed', 'slow', 1, 0.05) fault('port_write belt.speed', 'fail', 1)
+             fault('port_write belt.speed', 'slow', 1, 0.05) fault('port_write belt.speed', 'fail', 2)
              raise('e_stop') wait(0.02) raise('e_stop') wait(2) shutdown()"
         ),
     );
