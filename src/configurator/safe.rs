@@ -208,6 +208,10 @@ impl Engine {
         stood: Option<u64>,
     ) {
         let (request, frame, mut touched) = safe;
+        // Who asks for the same once more does not trust what it came to.
+        if self.world.stack.frames().iter().any(|other| other.configuration == frame.configuration) {
+            self.observing.at_once(self.given.clock.now());
+        }
         machine.note_done(&mut touched);
         let given = machine.planned().popped.iter().flat_map(|frame| &frame.saved).map(|saved| saved.slot);
         let given: Vec<_> = given.collect();

@@ -9,13 +9,15 @@ use super::squash::{list, squash};
 use super::void::rest;
 use super::work::{Op, Part, Planned, transaction};
 use super::{Edits, Frame, FrameId, Inverse, Reason, Request, Stack};
-use crate::model::{Change, ChangeKind, ComponentName, Configuration, StateEntry, StateList, Step, Target, codes};
+use crate::model::{
+    Change, ChangeKind, ComponentName, Configuration, StateEntry, StateList, Step, Target, Transition, codes,
+};
 use crate::plan::footprint::{Footprint, Slot};
 use crate::plan::undo::{DraftStep, items};
 use crate::plan::{PlanContext, PlannedStep, plan_on};
 use crate::system::{Overlay, System, View};
 use crate::time::Time;
-use rustc_hash::FxHashSet;
+use rustc_hash::{FxHashMap, FxHashSet};
 use std::borrow::Cow;
 use std::sync::Arc;
 
@@ -50,7 +52,7 @@ pub fn effort(
     let Some(frame) = planned.parts[0].edits.push.as_deref().cloned() else {
         return piecewise(system, configuration, request, at, context);
     };
-    if let Some(anew) = in_force_anew(system, stack, configuration, &planned, &frame, context) {
+    if let Some(anew) = asked_anew(system, stack, configuration, &planned, request, (at, context)) {
         return anew;
     }
     if !planned.of.is_empty() {
@@ -60,51 +62,58 @@ pub fn effort(
     BestEffort { planned, frame: Frame { left: request.gone, ..frame }, troubles: Vec::new() }
 }
 
-/// What is in force whole, and would bring something back to its run state of before for a moment to be done anew. Its demands are met; what it had
-/// called before that one came to rest is not called again, and all else that it calls is. A motor that it has braked and stopped is not
-/// started for another brake.
-fn in_force_anew(
+/// What is asked for once more, and would bring something back to its run state of before for a moment to be done anew: a motor that it has braked and
+/// stopped is not started for another brake. It is done as it stands, what it calls is called again, and its frame takes the older one over.
+fn asked_anew(
     system: &System,
     stack: &Stack,
     configuration: &Configuration,
     planned: &Planned,
-    new: &Frame,
-    context: &PlanContext,
+    request: &Request,
+    (at, context): (Time, &PlanContext),
 ) -> Option<BestEffort> {
     let [old] = planned.popped.as_slice() else { return None };
-    let moved = planned.steps.iter().filter(|planned| matches!(planned.step, Step::State { .. }));
-    let moved: FxHashSet<ComponentName> = moved.map(|planned| planned.step.component()).collect();
-    let at = stack.frames.iter().position(|frame| frame.id == old.id)?;
-    // What others have done to it since may be what it is asked for again.
-    let since = stack.frames[at + 1..].iter().any(|frame| share::meet(&moved, &frame.footprint));
-    let whole = old.configuration == configuration.id && !old.partial && !since;
-    if moved.is_empty() || !whole || !share::free(&stack.frames, at)?.keeps_calls_only() {
+    let mut moved = planned.steps.iter().filter(|planned| matches!(planned.step, Step::State { .. })).peekable();
+    if old.configuration != configuration.id || moved.peek().is_none() {
         return None;
     }
-    let mut steps = Vec::new();
-    for piece in pieces(configuration) {
-        let plan = plan_on(&mut Overlay::new(system), &piece, context).ok()?;
-        for planned in plan.steps.iter() {
-            match &planned.step {
-                Step::Operation(call) if moved.contains(&call.operation.component) => {}
-                Step::Operation(_) => steps.push(planned.clone()),
-                _ => return None,
-            }
-        }
+    let mut rest = configuration.clone();
+    rest.changes.retain(|change| !is_done(&change.kind, system));
+    let mut straight = piecewise(system, &rest, request, at, context);
+    beside(Arc::make_mut(&mut straight.planned.steps).as_mut_slice());
+    let wanted = |of: &PlannedStep| straight.planned.steps.iter().any(|planned| planned.step == of.step);
+    if moved.all(wanted) {
+        return None;
     }
-    for (id, planned) in (0..).zip(&mut steps) {
+    let below = stack.frames.iter().position(|frame| frame.id == old.id)?;
+    let lies_on = stack.frames[below + 1..].iter().any(|between| shares(old, between));
+    let hand = if lies_on { share::free(&stack.frames, below)? } else { HandOver::default() };
+    straight.frame = taken_over(&rest_of(old, &hand), &straight.frame);
+    let part = &mut straight.planned.parts[0];
+    part.edits.push = Some(Arc::new(straight.frame.clone()));
+    part.edits.pops = vec![(old.id, hand)];
+    straight.planned.popped.clone_from(&planned.popped);
+    Some(straight)
+}
+
+/// These are all that is done: what hangs on one component keeps no other one waiting.
+fn beside(steps: &mut [PlannedStep]) {
+    for (id, planned) in (0..).zip(&mut *steps) {
         (planned.id, planned.wave) = (id, 0);
     }
-    net::components_side_by_side(&mut steps);
-    let Frame { requester, at, scope, left, id, .. } = new.clone();
-    let frame = Frame { requester, at, scope, left, id, ..(**old).clone() };
-    let mut part = planned.parts[0].clone();
-    part.range = 0..u32::try_from(steps.len()).expect("fewer steps than that");
-    part.edits.push = Some(Arc::new(frame.clone()));
-    part.frame.clone_from(&part.edits.push);
-    let (steps, parts) = (Arc::new(steps), vec![part]);
-    let planned = Planned { steps, parts, of: Vec::new(), whole: Vec::new(), ..planned.clone() };
-    Some(BestEffort { planned, frame, troubles: Vec::new() })
+    net::components_side_by_side(steps);
+}
+
+/// Whether an act that would be refused is so already.
+fn is_done(act: &ChangeKind, system: &System) -> bool {
+    match act {
+        ChangeKind::Create { component, ty, .. } => {
+            system.component(*component).is_some_and(|node| node.ty.name == *ty)
+        }
+        ChangeKind::Connect { from, to, policy } => system.link(*from, *to) == Some(*policy),
+        ChangeKind::Disconnect { from, to } => system.link(*from, *to).is_none(),
+        _ => false,
+    }
 }
 
 /// A configuration without what is about components that are not there.
@@ -168,18 +177,22 @@ fn rest_of(frame: &Arc<Frame>, hand: &HandOver) -> Arc<Frame> {
     Arc::new(Frame { inverse, saved, footprint, ..(**frame).clone() })
 }
 
-/// A frame with what an older one did as well. What both have called, or brought to a run state, is taken back once, where the older one does:
-/// the newer one may have done it in its place, and each of them has it.
+/// A frame with what an older one did as well. What both have called is taken back once, and so is what both have brought to a run state: the newer
+/// one may have done it in the place of the older one.
 fn taken_over(old: &Frame, new: &Frame) -> Frame {
-    let theirs = list(old);
-    let again = |item: &DraftStep| {
-        let once = matches!(item.step, Step::Operation(_) | Step::State { .. });
-        once && theirs.iter().any(|other| other.step == item.step)
+    let (mut own, mut theirs) = (list(new), list(old));
+    own.retain(|item| !(matches!(item.step, Step::Operation(_)) && theirs.iter().any(|other| other.step == item.step)));
+    let mut states: FxHashMap<ComponentName, Transition> = FxHashMap::default();
+    let mut leads = |item: &DraftStep| match item.step {
+        Step::State { component, transition } => states.insert(component, transition) != Some(transition),
+        _ => true,
     };
-    let own: Vec<DraftStep> = list(new).into_iter().filter(|item| !again(item)).collect();
-    let new = &Frame { inverse: Inverse::List(Arc::new(own)), ..new.clone() };
+    own.iter().for_each(|item| _ = leads(item));
+    theirs.retain(leads);
+    let [old, new] = [(old, theirs), (new, own)]
+        .map(|(frame, items)| Frame { inverse: Inverse::List(Arc::new(items)), ..frame.clone() });
     let (group, scope, left, partial) = (new.group, new.scope, new.left, new.partial);
-    Frame { group, scope, left, partial, parts: Arc::default(), ..squash(old, new) }
+    Frame { group, scope, left, partial, parts: Arc::default(), ..squash(&old, &new) }
 }
 
 /// The frame of a safe configuration of which these steps were not done: it takes back what was.

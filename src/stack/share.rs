@@ -32,11 +32,6 @@ impl HandOver {
         self.slots.extend(slots);
     }
 
-    /// Nothing is handed over: what others have written since does not matter to it.
-    pub(super) fn keeps_calls_only(&self) -> bool {
-        self.takers.is_empty() && self.slots.iter().all(|slot| matches!(slot, Slot::Operation(_)))
-    }
-
     /// What is taken over.
     pub(super) fn taken(&self) -> impl Iterator<Item = Slot> + '_ {
         self.takers.iter().map(|(_, slot, _)| *slot)
@@ -60,7 +55,7 @@ pub fn components(footprint: &Footprint) -> FxHashSet<ComponentName> {
 }
 
 /// Whether two footprints have a component in common.
-pub(super) fn meet(mine: &FxHashSet<ComponentName>, theirs: &Footprint) -> bool {
+fn meet(mine: &FxHashSet<ComponentName>, theirs: &Footprint) -> bool {
     theirs.touches.iter().any(|touch| {
         let (a, b) = touch.slot.components();
         mine.contains(&a) || mine.contains(&b)
