@@ -17,8 +17,9 @@ local LOSSES = { "e_cmd_watchdog", "e_base_cmd_watchdog", "e_control_lost", "e_w
 -- Braked, until somebody says how to go on: `e_reset`, or `e_shutdown`, which is heard in every moment. A stop is heard in every
 -- moment as well, and what was said before it is not done any more: whatever moves meanwhile, since an operator insisted, is braked
 -- `again`; one that comes while `safe_hold` is undone does so too, since that may have to wait for what moves, and applies it again when
--- that is answered. `more`: what is particular to a place.
-local function stopped(more)
+-- that is answered. `more`: what is particular to a place. `released`: what is asked for in the step in which it is let go of, so that both are
+-- one, and nothing is in between.
+local function stopped(more, released)
   local braked = { "safe_hold.ok", "safe_hold.failed", "safe_hold.broken" }
   local braked_again = { "brake_again.ok", "brake_again.failed", "brake_again.broken" }
   local not_braked = { "brake_again.failed", "brake_again.broken" }
@@ -40,7 +41,7 @@ local function stopped(more)
       trans { src = "initial", tgt = "on" },
       trans { src = "on",      tgt = "stopped", events = STOPS },
     },
-    releasing = state { entry = "safe_hold.undo",
+    releasing = state { entry = { "safe_hold.undo", released },
       on              = state {},
       leaving         = state {},
       stopped         = state {},
@@ -76,6 +77,30 @@ local function stopped(more)
     if type(name) == "number" then table.insert(all, particular) else all[name] = particular end
   end
   return state(all)
+end
+
+-- Stopped in operation: when it is released the drives are asked to take torques, whatever they did meanwhile.
+local function in_operation(more, released)
+  local all = {
+    clearing  = state { entry = "clear_faults" },
+    resuming  = state { entry = "resume" },
+    trans { src = "waiting",            tgt = "clearing",           events = { "e_reset" } },
+    trans { src = "clearing",           tgt = "again",              events = STOPS },
+    trans { src = "clearing",           tgt = ".releasing.on",      events = { "clear_faults.ok" } },
+    trans { src = "clearing",           tgt = "waiting",            events = { "clear_faults.failed", "clear_faults.broken" } },
+    trans { src = "clearing",           tgt = ".releasing.leaving", events = { "e_shutdown" } },
+
+    -- Released, the drives may take torques already: what has died is told from then on, and some of it once.
+    trans { src = ".releasing.on",      tgt = ".releasing.stopped", events = LOSSES },
+    trans { src = ".releasing.on",      tgt = "resuming",           events = { "safe_hold.undone" } },
+    trans { src = "resuming",           tgt = "braking",            events = STOPS },
+    trans { src = "resuming",           tgt = "braking",            events = LOSSES },
+    trans { src = "resuming",           tgt = "braking",            events = { "resume.failed", "resume.broken" } },
+  }
+  for name, particular in pairs(more) do
+    if type(name) == "number" then table.insert(all, particular) else all[name] = particular end
+  end
+  return stopped(all, released)
 end
 
 -- A step of the way down that is not asked for twice: a stop leaves it only with its answer.
@@ -227,8 +252,7 @@ return state {
 
   -- Stopped in operation. When it is released the drives are asked to take torques, whatever they did meanwhile, and nothing
   -- couples before the arms are aligned again.
-  fault = stopped {
-    clearing  = state { entry = "clear_faults" },
+  fault = in_operation({
     losing    = state { entry = "safe_hold",
       on      = state {},
       staying = state {},
@@ -240,12 +264,6 @@ return state {
       trans { src = "staying", tgt = "leaving", events = { "e_shutdown" } },
     },
     repairing = state { entry = "restart_controller" },
-    resuming  = state { entry = "resume" },
-    trans { src = "waiting",            tgt = "clearing",           events = { "e_reset" } },
-    trans { src = "clearing",           tgt = "again",              events = STOPS },
-    trans { src = "clearing",           tgt = ".releasing.on",      events = { "clear_faults.ok" } },
-    trans { src = "clearing",           tgt = "waiting",            events = { "clear_faults.failed", "clear_faults.broken" } },
-    trans { src = "clearing",           tgt = ".releasing.leaving", events = { "e_shutdown" } },
 
     -- The controller itself stopped: the same, then it is started again without asking anybody.
     trans { src = ".losing.on",         tgt = "repairing",          events = { "safe_hold.ok" } },
@@ -259,14 +277,10 @@ return state {
     trans { src = "repairing",          tgt = "waiting",
             events = { "restart_controller.failed", "restart_controller.broken" } },
     trans { src = "repairing",          tgt = ".releasing.leaving", events = { "e_shutdown" } },
+  }),
 
-    -- Released, the drives may take torques already: what has died is told from then on, and some of it once.
-    trans { src = ".releasing.on",      tgt = ".releasing.stopped", events = LOSSES },
-    trans { src = ".releasing.on",      tgt = "resuming",           events = { "safe_hold.undone" } },
-    trans { src = "resuming",           tgt = "braking",            events = STOPS },
-    trans { src = "resuming",           tgt = "braking",            events = LOSSES },
-    trans { src = "resuming",           tgt = "braking",            events = { "resume.failed", "resume.broken" } },
-  },
+  -- The same where the coupling could not be ended: without more, the end of the stop would bring it back.
+  fault_coupled = in_operation({}, "disable_copying"),
 
   -- Stopped on the way up or on the way back, and on the way down: after `e_reset` it waits to be told what to do.
   halted   = stopped { trans { src = "waiting", tgt = ".releasing.on", events = { "e_reset" } } },
@@ -348,15 +362,19 @@ return state {
   trans { src = "operational", tgt = "fault", events = STOPS },
   trans { src = "operational", tgt = "fault", events = LOSSES },
   trans { src = "operational", tgt = "fault",
-          events = { "e_drives_let_go", "five_DOF.failed", "five_DOF.broken", "eight_DOF.broken", "base_stop.failed", "base_stop.broken",
-                     "enable_copying.broken", "disable_copying.failed", "disable_copying.broken" } },
+          events = { "e_drives_let_go", "five_DOF.failed", "five_DOF.broken", "eight_DOF.broken", "base_stop.failed", "base_stop.broken" } },
+  trans { src = "operational", tgt = "fault_coupled",
+          events = { "enable_copying.broken", "disable_copying.failed", "disable_copying.broken" } },
   trans { src = "operational", tgt = "fault.losing", events = { "e_controller_lost" } },
   -- What was asked for in leaving `operational` is answered here.
-  trans { src = "fault", tgt = "fault.again",
-          events = { "disable_copying.failed", "disable_copying.broken" } },
-  trans { src = "fault.resuming",           tgt = "operational",   events = { "resume.ok" } },
-  trans { src = "fault.resuming",           tgt = "shutting_down", events = { "e_shutdown" } },
-  trans { src = "fault.releasing.leaving",  tgt = "shutting_down.quieting.released", events = { "safe_hold.undone" } },
+  trans { src = "fault",   tgt = "fault_coupled.again", events = { "disable_copying.failed", "disable_copying.broken" } },
+  trans { src = "fault_coupled", tgt = "fault_coupled.again", events = { "disable_copying.failed", "disable_copying.broken" } },
+  trans { src = "fault.resuming",            tgt = "operational",   events = { "resume.ok" } },
+  trans { src = "fault.resuming",            tgt = "shutting_down", events = { "e_shutdown" } },
+  trans { src = "fault.releasing.leaving",   tgt = "shutting_down.quieting.released", events = { "safe_hold.undone" } },
+  trans { src = "fault_coupled.resuming",          tgt = "operational",   events = { "resume.ok" } },
+  trans { src = "fault_coupled.resuming",          tgt = "shutting_down", events = { "e_shutdown" } },
+  trans { src = "fault_coupled.releasing.leaving", tgt = "shutting_down.quieting.released", events = { "safe_hold.undone" } },
 
   trans { src = "shutting_down.quieting",     tgt = "lowering", events = STOPS },
   trans { src = "shutting_down.quieting.operated", tgt = "lowering", events = LOSSES },

@@ -248,6 +248,9 @@ fn meant(name: &str, near: Option<&str>) -> String {
     if let Some(near) = near {
         return format!("did you mean `{near}`?");
     }
+    if let Some(why) = lang::why_closed(name) {
+        return format!("{why}: what a script needs is given to it, `param(\"NAME\", DEFAULT)`");
+    }
     // What Lua has for it elsewhere is near nothing here.
     match name {
         "print" => "did you mean `say`?".to_owned(),

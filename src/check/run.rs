@@ -14,9 +14,9 @@ use super::report::{Accepted, Explored, Report};
 use super::state::Failed;
 use super::verdict::CheckVerdict;
 use super::{
-    alone, composed, configurations as single, coordinator, coupling, declared, interface, led_on, lets_go, library,
-    monitors as watched, paths, purity, safety, settings, simulated, slips, types, unasked, undriven, unhandled,
-    universe, unwatched, ways,
+    alone, composed, configurations as single, coordinator, coupling, declared, interface, led_on, library,
+    monitors as watched, moves_back, paths, purity, safety, settings, simulated, slips, types, unasked, undriven,
+    unhandled, universe, unwatched, ways,
 };
 use crate::model::codes::{CLASH, COORD_NO_WAY_DOWN, POST_ON_DESTROYED, PRE_ON_CREATED, TOUCHES_DESTROYED};
 use crate::model::{
@@ -62,7 +62,7 @@ fn run_one(
     findings.extend(watched::check(deployment, &universe));
     findings.extend(simulated::check(deployment, &universe));
     findings.extend(declared::check(deployment, &universe));
-    findings.extend(lets_go::check(deployment, &universe));
+    findings.extend(moves_back::check(deployment, &universe));
     findings.extend(alone::check(deployment));
     findings.extend(safety::unnamed(deployment, catalogue));
     let written = deployment.charts();
@@ -285,8 +285,8 @@ fn follow(
         }
     }
     // Said once, of what none of them asks for.
-    let unasked = unasked(deployment, &product, &asked);
-    found.extend(unasked.into_iter().map(|finding| (finding, Vec::new())));
+    let wrong = in_any_system(deployment, &product, &asked);
+    found.extend(wrong.into_iter().map(|finding| (finding, Vec::new())));
     found.sort_by_key(|(finding, _)| Reverse(finding.severity));
     for (finding, way) in found {
         // What is said twice of one place is told once, as the worse of both.
@@ -304,11 +304,11 @@ fn follow(
 }
 
 /// Configurations that the coordinator never asks for can still be applied by an operator. Whether they fit the system
-/// then is not known; what is wrong with them in any system is.
-fn unasked(deployment: &Deployment, product: &Product<'_>, asked: &FxHashSet<ConfigId>) -> Findings {
+/// then is not known; what is wrong with them in any system is. Of a safe one it is, too, of which as much is done as can be.
+fn in_any_system(deployment: &Deployment, product: &Product<'_>, asked: &FxHashSet<ConfigId>) -> Findings {
     const ANYWHERE: [Code; 4] = [CLASH, PRE_ON_CREATED, POST_ON_DESTROYED, TOUCHES_DESTROYED];
     let mut findings = Vec::new();
-    for configuration in deployment.configurations.iter().filter(|c| !asked.contains(&c.id)) {
+    for configuration in deployment.configurations.iter().filter(|c| c.safe || !asked.contains(&c.id)) {
         if let Err(refusal) = product.worlds.try_anywhere(configuration) {
             findings.extend(refusal.findings.into_iter().filter(|f| ANYWHERE.contains(&f.code)));
         }

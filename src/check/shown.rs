@@ -92,7 +92,6 @@ pub const READ: &[(&str, &[Code])] = &[
             TYPE_WITHOUT_CODE,
             TYPE_SETTLED_ELSEWHERE,
             CONF_HOLDS_UNSEEN,
-            CONF_SAFE_LETS_GO,
             CONF_SAFE_MOVES,
             CONF_ALONE_IN_GROUP,
             CONF_UNASKED,

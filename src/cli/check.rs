@@ -278,15 +278,16 @@ fn bounds(explored: &Explored, deployment: &Deployment, budget: CheckBudget) -> 
         return lines;
     }
     lines.push(format!(
-        "at most {CHECK_FRAMES} frames of one configuration are in force ({CHECK_LEFT} where undoing failed)"
+        "followed with at most {CHECK_FRAMES} frames of one configuration in force ({CHECK_LEFT} where undoing failed)"
     ));
     if deployment.coordinators.len() > 1 {
         lines.push(
-            "at most one event from outside comes before all coordinators have heard what came before".to_owned(),
+            "followed with at most one event from outside before all coordinators have heard what came before"
+                .to_owned(),
         );
     }
     if deployment.operator_applies().next().is_some() {
-        lines.push("at most 2 frames of an operator are in force at once, or one that is safe".to_owned());
+        lines.push("followed with at most 2 frames of an operator in force at once, or one that is safe".to_owned());
     }
     if explored.unfollowed > 0 {
         let rest = if explored.without_failure { ", all of them behind a request that failed" } else { "" };

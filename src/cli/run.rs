@@ -245,7 +245,7 @@ fn tell(script: &Path, failure: ScriptFailure) -> CommandFailure {
         ScriptFailure::Lua { message, syntax: false } => CommandFailure::no(
             SCRIPT_FAILED,
             message,
-            "what happened before is told above; `--json` tells it to a program",
+            "what happened before that, if anything, is told above; `--json` tells it to a program",
         ),
         ScriptFailure::Unread { message } => CommandFailure::usage(
             SCRIPT_UNKNOWN_PARAMETER,

@@ -45,7 +45,7 @@ impl Engine {
         let before = self.interrupt(id);
         let at = self.given.clock.now();
         // What earlier safe ones will have done counts as done; but what both write only this one does.
-        let (earlier, comes_after) = self.earlier_safe(&request);
+        let Earlier { steps: earlier, unknown, numbers: comes_after } = self.earlier_safe(&request);
         let stack = self.stack_with_earlier();
         let plan = |system: &System, earlier: &[Step]| {
             effort(&with(system, earlier), &stack, configuration, &request, at, &self.given.context)
@@ -53,6 +53,7 @@ impl Engine {
         let BestEffort { mut planned, frame, troubles } = plan(&self.world.system, &earlier);
         // What is on its way to the platform may have come there or not: what this one wants is written either way.
         let mut out = self.values_out();
+        out.extend(unknown);
         let mut here = with(&self.world.system, &out);
         if !out.is_empty() {
             let there = plan(&here, &earlier).planned;
@@ -67,8 +68,7 @@ impl Engine {
             yields |= other.machine.yield_to(planned.steps.iter().map(|planned| &planned.step));
         }
         if yields {
-            let (left, _) = self.earlier_safe(&request);
-            planned = plan(&here, &left).planned;
+            planned = plan(&here, &self.earlier_safe(&request).steps).planned;
         }
         let mut touched = Touched::default();
         planned.steps.iter().for_each(|planned| touched.add(&planned.step));
@@ -81,7 +81,7 @@ impl Engine {
                 touched.add_state(component, entry.state);
             }
         }
-        planned.popped.iter().for_each(|frame| touched.takes_place_of(frame));
+        taken_back(&planned).for_each(|frame| touched.takes_place_of(frame));
         touched.leaves(&frame);
         touched.planned_at(self.world.system.revision());
         self.safety.troubles.push(Troubled { request: request.id, reasons: troubles, missed: Vec::new() });
@@ -96,23 +96,24 @@ impl Engine {
         self.advance(0);
     }
 
-    /// The steps that safe configurations under way have still to do about what this one is about, and their numbers. Where it is the same one, and
-    /// takes the place of that, values and run states that are out are no such: nobody knows yet whether they come to be, and it has them done once
-    /// more.
-    fn earlier_safe(&self, request: &Request) -> (Vec<Step>, SmallVec<[u64; 1]>) {
+    /// What safe configurations under way have still to do about what this one is about.
+    fn earlier_safe(&self, request: &Request) -> Earlier {
         let about = self.given.claims.of([request]);
-        let (mut steps, mut numbers) = (Vec::new(), SmallVec::new());
+        let mut earlier = Earlier::default();
         for other in self.running.iter().rev().filter(|other| other.is_safe()) {
             let Purpose::Safe(safe) = &other.purpose else { continue };
             if self.given.claims.of([&safe.0]).meets(&about) {
-                let anew = safe.0.ask == request.ask
-                    && matches!(request.ask, Ask::Apply(id) if self.given.claims.replaces(id, id));
-                let counts = |open: &OpenStep| !(anew && open.begun) || matches!(open.step, Step::Operation(_));
-                steps.extend(other.machine.still_to_do().filter(counts).map(|open| open.step));
-                numbers.push(other.number);
+                let replaces = |one, other| self.given.claims.replaces(one, other);
+                let anew =
+                    matches!((request.ask, safe.0.ask), (Ask::Apply(one), Ask::Apply(other)) if replaces(one, other));
+                for open in other.machine.still_to_do() {
+                    let unknown = anew && open.begun && brings_about(&safe.1, &open.step);
+                    if unknown { &mut earlier.unknown } else { &mut earlier.steps }.push(open.step);
+                }
+                earlier.numbers.push(other.number);
             }
         }
-        (steps, numbers)
+        earlier
     }
 
     /// A safe configuration that is not there yet is let go of, and the undo is not carried out. False: none is coming.
@@ -213,7 +214,7 @@ impl Engine {
             self.observing.at_once(self.given.clock.now());
         }
         machine.note_done(&mut touched);
-        let given = machine.planned().popped.iter().flat_map(|frame| &frame.saved).map(|saved| saved.slot);
+        let given = taken_back(machine.planned()).flat_map(|frame| &frame.saved).map(|saved| saved.slot);
         let given: Vec<_> = given.collect();
         let failed = machine.failed_steps().map(|planned| &planned.step);
         touched.missed(failed.filter(|step| !given.contains(&slot(step))));
@@ -317,6 +318,31 @@ impl Engine {
         for running in self.running.iter_mut().filter(|running| running.is_interrupted()) {
             running.machine.on(Input::Release(touched.clone()), &mut self.world.system);
         }
+    }
+}
+
+/// What safe configurations that are being applied have still to do about the same things.
+#[derive(Default)]
+struct Earlier {
+    /// Counts as done.
+    steps: Vec<Step>,
+    /// Values and run states that are out, of one whose place is taken: nobody knows yet whether they come to be, and they are done once more. What
+    /// that one itself takes the place of is taken back by it all the same.
+    unknown: Vec<Step>,
+    /// Who.
+    numbers: SmallVec<[u64; 1]>,
+}
+
+/// The frames whose values one gives back: not what is safe itself, on top of which it is done.
+fn taken_back(planned: &Planned) -> impl Iterator<Item = &Arc<Frame>> {
+    planned.popped.iter().filter(|frame| !frame.safe)
+}
+
+/// Whether a frame has brought about this value or run state.
+fn brings_about(frame: &Frame, step: &Step) -> bool {
+    match step {
+        Step::State { component, .. } => frame.moved(*component).is_some(),
+        _ => frame.saved.iter().any(|saved| saved.slot == slot(step)),
     }
 }
 

@@ -12,7 +12,7 @@ use std::time::Duration;
 pub const ENDED: &CStr = c"ended: its instructions are used up";
 
 /// What whatever was [interrupted](Count::interrupted_by) ends with.
-pub const INTERRUPTED: &CStr = c"interrupted by a signal";
+pub const INTERRUPTED: &CStr = c"interrupted from outside";
 
 /// Counts for one call at a time: instructions, and what they set in motion (`work.rs`).
 #[derive(Default)]

@@ -39,6 +39,7 @@ pub use load::{
     Loaded, LoadedConfigurations, LoadedCoordinator, LoadedMonitors, load, load_configurations, load_coordinator,
     load_from, load_monitors,
 };
+pub use lua::why_closed;
 pub use slips::key_again;
 pub use texts::LoadOptions;
 pub use unknown_names::{UnknownName, unknown_names};

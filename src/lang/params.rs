@@ -5,7 +5,7 @@ use super::yaml;
 use crate::diagnostics::Language;
 use crate::lang::tree::Reading;
 use crate::model::finding::{did_you_mean, nearest};
-use crate::model::{Finding, Ident, Origin, ValueType, codes};
+use crate::model::{Finding, Ident, Origin, Severity, ValueType, codes};
 
 /// A parameter.
 #[derive(Debug)]
@@ -111,8 +111,10 @@ impl Params {
         if cx.findings.iter().any(|finding| finding.code == codes::TEXT_SYNTAX) {
             return;
         }
+        // Nor was all of it read of what has failed: that a declared one is not read means nothing then.
+        let failed = cx.findings.iter().any(|finding| finding.severity == Severity::Error);
         let others: Vec<String> = self.all.iter().filter(|p| !p.set || p.used).map(|p| p.name.clone()).collect();
-        for param in self.all.iter().filter(|p| !p.used) {
+        for param in self.all.iter().filter(|p| !p.used && (p.set || !failed)) {
             let within = if param.set { self.place.within.as_str() } else { "" };
             let message = format!("no Lua file reads the parameter `{within}{}`", param.name);
             // As the command line names them: `--set left.gain=1`.

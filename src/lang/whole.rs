@@ -202,7 +202,9 @@ impl DeploymentReader<'_> {
             if let Some((_, first)) = self.open.iter().find(|(open, _)| normal(open) == path) {
                 let message = format!("`{}` is a subsystem of itself", draft.file);
                 let finding = Finding::error(codes::COMPOSE_CIRCLE, message).at(draft.named_at);
-                cx.report(finding.also(*first, "named here").help("a deployment cannot be a part of itself"));
+                // The first file of all is named on the command line.
+                let finding = if *first == Origin::NONE { finding } else { finding.also(*first, "named here") };
+                cx.report(finding.help("a deployment cannot be a part of itself"));
                 continue;
             }
             if too_many {

@@ -299,10 +299,10 @@ codes! {
         "The key `platform` names where the components live, and this program has no platform of that name. `embedded` \
          runs components of the libraries in this process; `simulated` runs any declared type without components.";
     // ---- configurations and plans ----------------------------------------------------------------------------------
-    CONF_KEYED_ENTRIES = "conf::keyed_entries", "two keyed entries in a state list have no order",
+    CONF_KEYED_ENTRIES = "conf::keyed_entries", "a keyed entry in a state list has no place in its order",
         "A state list is applied in its order, but the named entries of a Lua table have none: with two or more keys, \
          chance would decide which component changes first. Write them as a list: `{ 'compA:running', \
-         '_default:stopped' }`. One key alone is fine, and comes after the entries.";
+         '_default:stopped' }`. One key alone is fine; beside entries it is `_default`, which comes after them.";
     CONF_BAD_STATE = "conf::bad_state", "this is not a run state that can be demanded",
         "Run states are `unconfigured`, `stopped` and `running`; the names of RTT, ROS 2 and microblx are understood as \
          well. `faulted` cannot be demanded: components get there by themselves. An entry of a state list is written \
@@ -339,11 +339,6 @@ codes! {
          something of it moves when it is taken back. In an emergency that moves which is to be stopped. Give the safe one a \
          group of its own: it is in force over the other one then, and that moves where somebody asks for its undo. What a run state leads to is not \
          looked at.";
-    CONF_SAFE_LETS_GO = "conf::safe_lets_go", "a safe configuration lets go of what another one has made safe",
-        "Two safe configurations are alternatives (`group`), so that applying the second one undoes the first one's frame: what \
-         that has called, and what an operation takes back, set, or brought to a run state is taken back before the second one acts. \
-         From that moment on it is not safe: where the first one brakes and the second one holds, the brakes open first. What both call \
-         is not taken back in between. Let the second one do it too, or leave the group out: frames of safe configurations may be in force together.";
     CONF_ALONE_IN_GROUP = "conf::alone_in_group", "a configuration is alone in its group, and another one is called nearly so",
         "Configurations of one `group` are alternatives: applying one replaces the frame of the one that is in force. This group has \
          only one configuration, which replaces nothing, and another group has nearly the same name: one of both is misspelt, as it \
@@ -414,7 +409,7 @@ codes! {
     MISSING_PROPERTY = "conf::missing_property", "a property without a default is not given",
         "The type declares this property without a default, so a component cannot be created without a value for it. Give the value in the create itself; a property_set beside it comes too late, for the component would exist without one in between.";
     CLASH = "conf::clash", "two changes of one configuration do not commute",
-        "The changes of a configuration are a set: no order is promised among them. These two touch the same thing and would leave different systems in different orders. Keep one of them, or write two configurations and apply them one after the other.";
+        "The changes of a configuration are a set: no order is promised among them. These two touch the same thing and would leave different systems in different orders; so do a call and the one that takes it back. Keep one of them, or write two configurations and apply them one after the other.";
     CHANGE_TWICE = "conf::change_twice", "one change stands twice in a configuration",
         "The changes of a configuration are a set: what stands in it twice, word for word, is done once. An operation that is to be called twice is called by two configurations, one after the other. Of everything else remove one.";
     DEFAULT_TWICE = "conf::default_twice", "`_default` stands twice in one list",

@@ -9,7 +9,7 @@ use super::builder::PlanBuilder;
 use super::conflicts::{Sorted, Use, clash};
 use super::meant::Meant;
 use crate::model::{Change, ChangeKind, ComponentName, MemberRef, Origin, RunState, Step, Wanted};
-use crate::system::{View, Violation, step};
+use crate::system::{Undo, View, Violation, step};
 use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
 
@@ -82,6 +82,36 @@ pub(super) fn apply(b: &mut PlanBuilder<'_, '_, '_>, sorted: &Sorted) {
                 connect(b, &waits, *from, *to, meant.step, change, &classes[4]);
             }
             ChangeKind::Replace { .. } => {}
+        }
+    }
+    opposites(b, &classes[3]);
+}
+
+/// Two calls of which one takes the other one back: what stands in the end would depend on the order.
+fn opposites(b: &mut PlanBuilder<'_, '_, '_>, own: &[u32]) {
+    let changes = own.iter().map(|i| &b.configuration.changes[*i as usize]);
+    let calls: Vec<(&Change, MemberRef)> = changes
+        .filter_map(|change| match &change.kind {
+            ChangeKind::OperationCall { call, .. } => Some((change, call.operation)),
+            _ => None,
+        })
+        .collect();
+    if calls.len() < 2 {
+        return;
+    }
+    let taken_back_by = |change: &Change| {
+        let meant = Meant::of(&change.kind, b.view, b.context);
+        match step::inverse(&meant.step, meant.undo.as_ref(), b.view) {
+            Undo::One(Step::Operation(call)) => Some(call.operation),
+            _ => None,
+        }
+    };
+    let backs: Vec<Option<MemberRef>> = calls.iter().map(|(change, _)| taken_back_by(change)).collect();
+    for (second, (change, operation)) in calls.iter().enumerate() {
+        let other =
+            (0..second).find(|first| backs[*first] == Some(*operation) || backs[second] == Some(calls[*first].1));
+        if let Some(first) = other {
+            b.findings.push(clash(calls[first].0, change));
         }
     }
 }

@@ -276,6 +276,10 @@ fn clashes_show_both_lines() {
     assert_eq!(one(vec![connect("A.y", "A.u"), connect("B.y", "A.u")]), [("conf::clash", 2, vec![1])]);
     assert_eq!(one(vec![create("C", "t.Gain", &[]), create("C", "t.Motor", &[])]), [("conf::clash", 2, vec![1])]);
     assert_eq!(one(vec![call("A.open", None), call("A.open", Some("A.close"))]), [("conf::clash", 2, vec![1])]);
+    // A call and what takes it back, in either order.
+    assert_eq!(one(vec![call("A.open", None), call("A.close", None)]), [("conf::clash", 2, vec![1])]);
+    assert_eq!(one(vec![call("A.close", None), call("A.open", None)]), [("conf::clash", 2, vec![1])]);
+    assert_eq!(one(vec![call("A.close", Some("A.weld")), call("A.weld", None)]), [("conf::clash", 2, vec![1])]);
     let gone = vec![disconnect("A.y", "B.u"), destroy("B"), set("B.v", Value::floats(&[1.0; 3]))];
     assert_eq!(one(gone), [("conf::touches_destroyed", 3, vec![2])]);
     // One value as an int and as a float is one demand.

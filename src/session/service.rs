@@ -253,12 +253,20 @@ fn event(session: &Session, params: &Json, gone: ServiceGone<'_>) -> Result<Json
     }
     let since = session.hub().heard();
     if let Some(wait_for) = wait_for {
-        session.offer(event, "operator").map_err(not_raised)?;
+        let Offered { ticket, acted } = session.offer_watched(event, "operator").map_err(not_raised)?;
+        // What no transition hears leads to nothing that could be waited for, but for what functions see, and what it confirms.
+        let alone = acted.is_none() && !session.sees_all_events() && !session.confirms(event);
         let late = format!("`{wait_for}` was not heard in time");
         let mut ends = instead(&wait_for);
         ends.push(wait_for);
-        let heard = wait(session, within, gone, || late, |hub| hub.first_heard(&ends, since))?;
-        answer["heard"] = json!(heard);
+        let unheard = |hub: &Hub| (alone && hub.was_heard(ticket) == Some(false)).then_some(None);
+        let either = |hub: &Hub| hub.first_heard(&ends, since).map(Some).or_else(|| unheard(hub));
+        let heard = wait(session, within, gone, || late, either);
+        session.hub().forget(ticket);
+        match heard? {
+            Some(heard) => answer["heard"] = json!(heard),
+            None => answer["taken"] = json!(false),
+        }
     } else if waits {
         let Offered { ticket, acted } = session.offer_watched(event, "operator").map_err(not_raised)?;
         if let Some(Acted { requests, before }) = acted {

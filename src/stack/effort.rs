@@ -44,56 +44,69 @@ pub fn effort(
     // What concerns a component that is not there has nothing to be made safe.
     let there = of_what_is_there(system, configuration);
     let configuration = &*there;
+    on_top(system, stack, configuration, request, (at, context))
+        .or_else(|| whole(system, stack, configuration, request, (at, context)))
+        .unwrap_or_else(|| piecewise(system, configuration, request, at, context))
+}
+
+/// Planned whole, if it can be.
+fn whole(
+    system: &System,
+    stack: &Stack,
+    configuration: &Configuration,
+    request: &Request,
+    (at, context): (Time, &PlanContext),
+) -> Option<BestEffort> {
     let scope = request.scope.filter(|_| !request.gone);
     let op = Op::Push { configuration, requester: request.requester, at, scope };
-    let Ok(mut planned) = transaction(system, stack, &[op], context) else {
-        return piecewise(system, configuration, request, at, context);
-    };
-    let Some(frame) = planned.parts[0].edits.push.as_deref().cloned() else {
-        return piecewise(system, configuration, request, at, context);
-    };
-    if let Some(anew) = asked_anew(system, stack, configuration, &planned, request, (at, context)) {
-        return anew;
-    }
+    let mut planned = transaction(system, stack, &[op], context).ok()?;
+    let frame = planned.parts[0].edits.push.as_deref().cloned()?;
     if !planned.of.is_empty() {
         let steps: &mut Vec<PlannedStep> = Arc::make_mut(&mut planned.steps);
         net::components_side_by_side(steps);
     }
-    BestEffort { planned, frame: Frame { left: request.gone, ..frame }, troubles: Vec::new() }
+    Some(BestEffort { planned, frame: Frame { left: request.gone, ..frame }, troubles: Vec::new() })
 }
 
-/// What is asked for once more, and would bring something back to its run state of before for a moment to be done anew: a motor that it has braked and
-/// stopped is not started for another brake. It is done as it stands, what it calls is called again, and its frame takes the older one over.
-fn asked_anew(
+/// What takes the place of something safe, the same once more or another one of its group: what that has made safe stays so, nothing is let go of
+/// in between. It is done as things stand, what it calls is called again, and its frame takes the older one over
+/// ([`take_over_group`]).
+fn on_top(
     system: &System,
     stack: &Stack,
     configuration: &Configuration,
-    planned: &Planned,
     request: &Request,
     (at, context): (Time, &PlanContext),
 ) -> Option<BestEffort> {
-    let [old] = planned.popped.as_slice() else { return None };
-    let mut moved = planned.steps.iter().filter(|planned| matches!(planned.step, Step::State { .. })).peekable();
-    if old.configuration != configuration.id || moved.peek().is_none() {
+    let group = configuration.group?;
+    let below = stack.frames.iter().rposition(|frame| frame.group == Some(group))?;
+    let old = &stack.frames[below];
+    if !old.safe || old.foreign_to(request.requester).is_some() {
         return None;
     }
     let mut rest = configuration.clone();
     rest.changes.retain(|change| !is_done(&change.kind, system));
-    let mut straight = piecewise(system, &rest, request, at, context);
-    beside(Arc::make_mut(&mut straight.planned.steps).as_mut_slice());
-    let wanted = |of: &PlannedStep| straight.planned.steps.iter().any(|planned| planned.step == of.step);
-    if moved.all(wanted) {
-        return None;
-    }
-    let below = stack.frames.iter().position(|frame| frame.id == old.id)?;
-    let lies_on = stack.frames[below + 1..].iter().any(|between| shares(old, between));
-    let hand = if lies_on { share::free(&stack.frames, below)? } else { HandOver::default() };
-    straight.frame = taken_over(&rest_of(old, &hand), &straight.frame);
+    rest.group = None;
+    let mut straight = whole(system, stack, &rest, request, (at, context)).unwrap_or_else(|| {
+        let mut by_pieces = piecewise(system, &rest, request, at, context);
+        beside(Arc::make_mut(&mut by_pieces.planned.steps).as_mut_slice());
+        by_pieces
+    });
+    straight.frame.group = Some(group);
+    let frame = Some(Arc::new(straight.frame.clone()));
     let part = &mut straight.planned.parts[0];
-    part.edits.push = Some(Arc::new(straight.frame.clone()));
-    part.edits.pops = vec![(old.id, hand)];
-    straight.planned.popped.clone_from(&planned.popped);
+    (part.frame, part.edits.push) = (frame.clone(), frame);
+    if over(&stack.frames, below, stack.frames.len()).is_some() {
+        part.edits.pops = vec![(old.id, HandOver::default())];
+        straight.planned.popped = vec![old.clone()];
+    }
     Some(straight)
+}
+
+/// What lies between a frame and the one at `at` has written over the former; none: that cannot go up past these.
+fn over(frames: &[Arc<Frame>], below: usize, at: usize) -> Option<HandOver> {
+    let lies_on = frames[below + 1..at].iter().any(|between| shares(&frames[below], between));
+    if lies_on { share::free(&frames[below..at], 0) } else { Some(HandOver::default()) }
 }
 
 /// These are all that is done: what hangs on one component keeps no other one waiting.
@@ -150,10 +163,8 @@ pub(super) fn take_over_group(frames: &mut Vec<Arc<Frame>>, pushed: FrameId, bus
             continue;
         }
         // What lies between stays where it is, and has what it has written over what the old one had.
-        let lies_on = frames[below + 1..at].iter().any(|between| shares(old, between));
-        let hand = if lies_on { share::free(&frames[below..at], 0) } else { Some(HandOver::default()) };
-        if let Some(hand) = hand {
-            let old = rest_of(old, &hand);
+        if let Some(hand) = over(frames, below, at) {
+            let old = rest_of(&frames[below], &hand);
             share::hand_over(frames, &hand, &|id| id);
             frames[at] = Arc::new(taken_over(&old, &frames[at]));
             frames.remove(below);
@@ -182,6 +193,10 @@ fn rest_of(frame: &Arc<Frame>, hand: &HandOver) -> Arc<Frame> {
 fn taken_over(old: &Frame, new: &Frame) -> Frame {
     let (mut own, mut theirs) = (list(new), list(old));
     own.retain(|item| !(matches!(item.step, Step::Operation(_)) && theirs.iter().any(|other| other.step == item.step)));
+    if own.is_empty() && new.configuration == old.configuration && new.footprint == old.footprint {
+        let (inverse, footprint) = (old.inverse.clone(), old.footprint.clone());
+        return Frame { inverse, footprint, saved: old.saved.clone(), floor: old.floor.clone(), ..new.clone() };
+    }
     let mut states: FxHashMap<ComponentName, Transition> = FxHashMap::default();
     let mut leads = |item: &DraftStep| match item.step {
         Step::State { component, transition } => states.insert(component, transition) != Some(transition),

@@ -429,15 +429,20 @@ impl Stack {
 
     /// Pushes the frame of a safe configuration that has been applied as far as it goes, with what goes with it. Frames of what is `broken`
     /// are not squashed, but one of their group takes their place.
-    pub fn push_safe(&mut self, edits: Edits, frame: Frame, busy: &[FrameId], broken: &[FrameId]) -> FrameId {
+    pub fn push_safe(&mut self, mut edits: Edits, frame: Frame, busy: &[FrameId], broken: &[FrameId]) -> FrameId {
         let kept: SmallVec<[FrameId; 4]> = busy.iter().chain(broken).copied().collect();
+        // It takes over what is safe itself.
+        let of_group = |id: FrameId| self.frame(id).is_some_and(|other| other.safe && other.group == frame.group);
+        let taken: SmallVec<[FrameId; 2]> = edits.pops.iter().map(|(id, _)| *id).filter(|id| of_group(*id)).collect();
+        edits.pops.retain(|(id, _)| !taken.contains(id));
+        let busy: SmallVec<[FrameId; 4]> = busy.iter().copied().filter(|id| !taken.contains(id)).collect();
         let push = Some(Arc::new(Frame { safe: true, ..frame }));
         let (bound, waits) = (self.bound, edits.waits);
         // Two of a group are one before they count.
         self.bound = bound.saturating_add(1);
         let pushed = self.apply([&Edits { push, ..edits }], &kept).first().copied().unwrap_or(FrameId(0));
         self.bound = bound;
-        effort::take_over_group(&mut self.frames, pushed, busy);
+        effort::take_over_group(&mut self.frames, pushed, &busy);
         if let Some(pile) = self.frame(pushed).map(|frame| frame.pile()) {
             let busy: SmallVec<[FrameId; 4]> = kept.into_iter().chain(waits.then_some(pushed)).collect();
             let room = squash::Quota { pile, bound, busy: &busy };

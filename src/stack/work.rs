@@ -335,7 +335,7 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
                     }
                     let after: SmallVec<[StepId; 1]> =
                         self.script.steps.last().filter(|s| s.wave == wave).map(|s| s.id).into_iter().collect();
-                    match frame.partial {
+                    match frame.partial || frame.safe {
                         true => self.script.add_left(item.clone(), wave, &after)?,
                         false => self.script.add(item.clone(), wave, &after)?,
                     };

@@ -475,33 +475,34 @@ fn what_commands_an_actuator_and_dies_is_noticed() {
     assert_eq!(unwatched(&holds, "", ""), ["aside"]);
 }
 
+/// Of something safe as much is done as can be; what can be done in no system is refused all the same.
 #[test]
-fn a_safe_configuration_does_not_let_go_of_what_another_one_has_made_safe() {
-    let of = |stop: &str, halt: &str| {
+fn what_does_not_commute_is_refused_in_something_safe_too() {
+    let of = |changes: &str| {
         let configurations = format!(
-            "base = Configuration {{ create(\"a\", \"Drive\") }},
-             stop = Configuration {{ safe = true, group = \"stopped\", operation_call(\"a.open\"){stop} }},
-             halt = Configuration {{ {halt} property_set(\"a.gain\", 0.0) }},"
+            "base = Configuration {{ create(\"a\", \"Drive\"), post_conf_state = {{ \"a:running\" }} }},
+             stop = Configuration {{ safe = true, {changes} }},"
         );
         let said = Small::new(&configurations, STATES, "").check();
-        let found = said.of("conf::safe_lets_go");
-        assert!(found.iter().all(|finding| finding["severity"] == "warning"), "{:#}", said.0);
-        found.iter().map(|finding| finding["message"].as_str().unwrap().to_owned()).collect::<Vec<_>>()
+        said.of("conf::clash").iter().filter(|finding| finding["severity"] == "error").count()
     };
-    let told = |halt: &str| of(", property_set(\"a.gain\", 0.0)", halt);
-    let told_of = told("safe = true, group = \"stopped\",");
-    assert_eq!(told_of.len(), 1, "{told_of:?}");
-    assert!(told_of[0].starts_with("`halt` replaces `stop`") && told_of[0].contains("`a.close`"), "{told_of:?}");
-    // It calls it too; they are no alternatives; it is no safe one: somebody wants it to go on.
-    assert_eq!(told("safe = true, group = \"stopped\", operation_call(\"a.open\"),"), [""; 0]);
-    assert_eq!(told("safe = true,"), [""; 0]);
-    assert_eq!(told("group = \"stopped\","), [""; 0]);
-    // What is set, and brought to a run state, is taken back as well.
-    let both = "safe = true, group = \"stopped\", operation_call(\"a.open\"),";
-    let (set, brought) =
-        (of("", both), of(", property_set(\"a.gain\", 1.0), post_conf_state = { \"a:stopped\" }", both));
-    assert!(set.len() == 1 && set[0].contains("lets go of what that has made safe: `a.gain` is set back"), "{set:?}");
-    assert!(brought.len() == 1 && brought[0].contains("the run state of `a` is taken back"), "{brought:?}");
+    assert_eq!(of("property_set(\"a.gain\", 0.0), operation_call(\"a.open\")"), 0);
+    assert_eq!(of("property_set(\"a.gain\", 0.0), property_set(\"a.gain\", 1.0)"), 1);
+    // A call and what takes it back.
+    assert_eq!(of("operation_call(\"a.open\"), operation_call(\"a.close\")"), 1);
+}
+
+/// A key has no place in a list; behind it `_default` may stand as one.
+#[test]
+fn a_keyed_run_state_beside_others_is_refused() {
+    let of = |states: &str| {
+        let configurations = format!(
+            "base = Configuration {{ create(\"a\", \"Drive\"), create(\"b\", \"Drive\"), post_conf_state = {{ {states} }} }},"
+        );
+        Small::new(&configurations, STATES, "").check().of("conf::keyed_entries").len()
+    };
+    assert_eq!(of("\"a:running\", _default = \"running\""), 0);
+    assert_eq!(of("a = \"running\", \"b:running\""), 1);
 }
 
 /// Something safe takes the place of something that is not: what moves when that is taken back would move in an emergency.
@@ -538,6 +539,8 @@ fn what_moves_when_something_safe_takes_its_place_is_warned_of() {
     assert_eq!(of(turned, ""), [""; 0]);
     assert_eq!(of("group = \"g\", property_set(\"a.gain\", 2.0),", "group = \"g\","), [""; 0]);
     assert_eq!(of(turned, "group = \"h\","), [""; 0]);
+    // Of what is safe itself nothing is taken back.
+    assert_eq!(of("safe = true, group = \"g\", operation_call(\"a.turn\"),", "group = \"g\","), [""; 0]);
     // What it has brought to rest would start again, unless the safe one brings it to rest as well.
     let rests = "group = \"g\", post_conf_state = { \"a:stopped\" },";
     let told = of(rests, "group = \"g\",");

@@ -151,8 +151,7 @@ fn a_way_that_depends_on_the_order_of_answers_is_not_sure() {
 #[test]
 fn what_is_followed_of_several_is_always_said() {
     let text = |small: &Small| small.demo.run(&["check", "small.yaml"]).out;
-    let (event, frames) =
-        ("at most one event from outside comes before", "at most 2 frames of an operator are in force");
+    let (event, frames) = ("at most one event from outside before", "at most 2 frames of an operator in force");
     let conf = format!("{BASE}, soft = Configuration {{ property_set('a.gain', 2.0) }}");
     let one = text(&Small::new(&conf, &by_base("up", "leaving", ""), ""));
     assert!(!one.contains(event) && !one.contains(frames), "{one}");

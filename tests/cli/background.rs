@@ -33,6 +33,14 @@ fn deployed_switched_undone_and_shut_down() {
         1.0,
         "not raised"
     );
+    // What no transition hears leads to no answer, whatever others bring about meanwhile.
+    let unheard = run(&["event", "e_slow", "--wait", "slow.ok"]);
+    assert_eq!(
+        (unheard.code, unheard.out.as_str()),
+        (1, "e_slow raised, and no transition heard it\n"),
+        "{}",
+        unheard.err
+    );
     let event = run(&["event", "e_fast", "--wait", "fast.ok"]);
     assert_eq!(event.code, 0, "{}{}", event.out, event.err);
     assert_eq!(run(&["status", "--json"]).json()["system"]["components"]["source"]["properties"]["k"], 9.0);

@@ -80,7 +80,7 @@ fn the_order_of_frames_does_not_count_where_neither_keeps_the_other() {
 fn what_was_not_followed_is_told() {
     let demo = Demo::new();
     let text = demo.run(&["check", "deployment.yaml"]).out;
-    assert!(text.contains("at most 3 frames of one configuration are in force"), "{text}");
+    assert!(text.contains("followed with at most 3 frames of one configuration in force"), "{text}");
     assert!(!text.contains("not followed further"), "{text}");
     // Twelve switches that have nothing to do with each other: more systems than anybody follows.
     let mut states = String::new();

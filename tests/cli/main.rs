@@ -1,6 +1,7 @@
 //! The command line as people and programs meet it: what is printed, in which shape, with which exit status.
 
 mod agree;
+mod alternatives;
 mod answered;
 mod apart;
 mod at_once;
@@ -56,6 +57,7 @@ mod told;
 #[path = "../lang/tongue.rs"]
 mod tongue;
 mod unasked;
+mod uncoupled;
 mod unheard;
 mod vanished;
 mod watching;

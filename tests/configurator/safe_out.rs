@@ -56,10 +56,10 @@ fn what_is_as_wanted_for_all_that_is_known_is_written_where_something_else_is_on
     }
 }
 
-/// The undo of a safe one is interrupted by another one of its group: what it had set is not in force any more, whichever way the
+/// The undo of a safe one is interrupted by another one of its group: what it had set stays so until that is let go of, whichever way the
 /// write that was out went.
 #[test]
-fn what_one_takes_the_place_of_does_not_come_back_with_what_it_interrupted() {
+fn what_one_takes_the_place_of_stays_when_its_undo_is_interrupted() {
     for between in [false, true] {
         for lands in [0.05, 0.15, 0.3] {
             let rig = about_a("low hold");
@@ -77,6 +77,9 @@ fn what_one_takes_the_place_of_does_not_come_back_with_what_it_interrupted() {
             rig.wait(50.0);
             rig.platform.set_delays(Delays::default());
             assert_eq!(rig.frames(), ["make", "gain", "hold"], "{between} {lands}");
+            assert_eq!(gain(&rig), Value::Float(3.0), "as `low` says: {between} {lands}");
+            rig.in_step();
+            assert_eq!(rig.ask("hold.undo"), ["hold.undone"]);
             assert_eq!(gain(&rig), Value::Float(7.0), "as `gain` says: {between} {lands}");
             rig.in_step();
             rig.each_answered_once();

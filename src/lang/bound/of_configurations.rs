@@ -74,15 +74,18 @@ fn states(cx: &mut Cx, entry: Entry) -> StateList {
             return StateList::default();
         }
     };
-    // One key behind a list is the paper's, and Lua's alone.
-    if keyed.len() > 1 || (!keyed.is_empty() && !cx.is_lua(list_origin)) {
-        let as_list: Vec<String> = keyed
-            .iter()
-            .map(|e| match &e.value.kind {
-                Kind::Str(state) => format!("'{}:{state}'", e.key),
-                _ => format!("'{}:stopped'", e.key),
-            })
-            .collect();
+    // One key, and behind a list `_default` alone, is the paper's, and Lua's alone: elsewhere it would stand last, wherever it is written.
+    let last = |keyed: &Entry| list.is_empty() || keyed.key == "_default";
+    if keyed.len() > 1 || (!keyed.is_empty() && !cx.is_lua(list_origin)) || !keyed.iter().all(last) {
+        let keys = keyed.iter().map(|e| match &e.value.kind {
+            Kind::Str(state) => format!("'{}:{state}'", e.key),
+            _ => format!("'{}:stopped'", e.key),
+        });
+        let texts = list.iter().filter_map(|node| match &node.kind {
+            Kind::Str(text) => Some(format!("'{text}'")),
+            _ => None,
+        });
+        let as_list: Vec<String> = keys.chain(texts).collect();
         let as_list = cx.spelt(list_origin, &format!("{{ {} }}", as_list.join(", ")));
         cx.report(
             Finding::error(

@@ -227,7 +227,7 @@ static CREATE: Object = Object {
             "activity = \"control\"",
             ("activity: 1", TEXT_WRONG_TYPE),
         )
-        .without("the activity `default`, with a period of 10 ms"),
+        .without("one with a period of 10 ms, which no file names (`davit status` calls it `default`)"),
         PROPERTIES,
     ],
     ..Object::BARE

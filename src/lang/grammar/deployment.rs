@@ -64,7 +64,7 @@ pub static DEPLOYMENT: Object = Object {
             "Threads in which components are updated; `create` names the one of its component.",
             "activities: { control: { period_ms: 1.0, priority: 80 } }",
             ("activities: [control]", TEXT_WRONG_TYPE),
-        ).without("there is the activity `default`, with a period of 10 ms"),
+        ).without("there is one with a period of 10 ms, which no file names (`davit status` calls it `default`)"),
         key(
             "configurations",
             FILES,

@@ -21,6 +21,7 @@ use crate::model::{Finding, codes};
 use mlua::chunk::ChunkMode;
 use mlua::{LuaOptions, StdLib};
 use recorder::{Recorder, SharedRecorder};
+pub use sandbox::why_closed;
 use std::cell::RefCell;
 use std::path::PathBuf;
 use std::rc::Rc;

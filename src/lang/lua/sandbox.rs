@@ -71,6 +71,12 @@ const CLOSED: &[(&str, &str)] = &[
     ("coroutine.close", "coroutines end by themselves"),
 ];
 
+/// Why a name of Lua is not there; none: it is, or is none of Lua's.
+pub fn why_closed(name: &str) -> Option<&'static str> {
+    let name = if name == "require" { "dofile" } else { name };
+    CLOSED.iter().find(|(closed, _)| *closed == name).map(|(_, why)| *why)
+}
+
 const SORT: &str = "
 return function(list, less)
   less = less or function(a, b) return a < b end
@@ -260,8 +266,8 @@ pub fn undefined(lua: &Lua, shared: &SharedRecorder, table: &Table, prefix: &str
             true => recorder.read_at(line, &name),
             false => recorder.word_at(line, &name),
         };
-        let finding = match CLOSED.iter().find(|(closed, _)| *closed == full) {
-            Some((_, why)) => Finding::error(codes::LUA_CLOSED, format!("`{full}` is not there: {why}"))
+        let finding = match why_closed(&full) {
+            Some(why) => Finding::error(codes::LUA_CLOSED, format!("`{full}` is not there: {why}"))
                 .at(origin)
                 .help("a configuration file is plain data with a little arithmetic: give what it needs as a parameter (`with:`)"),
             None => {

@@ -1,11 +1,11 @@
-//! What a safe configuration takes back of another one of its group: what that has made safe, and what moves when it is taken back.
+//! What a safe configuration takes back of another one of its group that is not safe: what moves then.
 //!
 //! Alternatives replace one another: the frame that was in force is undone, and what it had called is taken back, before the
 //! next one acts. What both call is not taken back in between (`stack/share.rs`); what only the first one calls is, and so is what
-//! only the first one sets, or brings to a run state.
+//! only the first one has brought to a run state. Where both are safe nothing is taken back (`stack/effort.rs`).
 
 use super::universe::Universe;
-use crate::model::codes::{CONF_SAFE_LETS_GO, CONF_SAFE_MOVES};
+use crate::model::codes::CONF_SAFE_MOVES;
 use crate::model::{
     Ask, Call, ChangeKind, Configuration, Deployment, Finding, Findings, MemberRef, Origin, StateEntry, Target, Wanted,
 };
@@ -21,20 +21,14 @@ struct Kept {
     keep: String,
 }
 
-/// Of every two alternatives of which the second one is safe: what the first one has made safe and the second one lets go of, or, where it is not
-/// safe, what of it moves when it is taken back.
+/// Of every two alternatives of which only the second one is safe: what of the first one moves when it is taken back.
 pub fn check(deployment: &Deployment, universe: &Universe) -> Findings {
     let grouped = || deployment.configurations.iter().filter(|c| c.group.is_some());
-    let pairs = grouped().flat_map(|first| {
-        let others =
-            grouped().filter(move |second| second.safe && second.group == first.group && second.id != first.id);
+    let pairs = grouped().filter(|first| !first.safe).flat_map(|first| {
+        let others = grouped().filter(move |second| second.safe && second.group == first.group);
         others.map(move |second| (first, second))
     });
-    let found = pairs.filter_map(|(first, second)| match first.safe {
-        true => Some(finding(first, second, &let_go_of(first, second, universe)?)),
-        false => Some(moving(first, second, &moves_back(first, second, universe)?)),
-    });
-    found.collect()
+    pairs.filter_map(|(first, second)| Some(finding(first, second, &moves_back(first, second, universe)?))).collect()
 }
 
 fn calls(configuration: &Configuration) -> impl Iterator<Item = (&Call, Option<&Call>, Origin)> {
@@ -97,56 +91,7 @@ fn brings(configuration: &Configuration) -> Vec<Target> {
     configuration.pre.iter().chain(configuration.post.iter()).map(|entry| entry.target).collect()
 }
 
-/// What the first one has made safe, and the second one does nothing about.
-fn let_go_of(first: &Configuration, second: &Configuration, universe: &Universe) -> Option<Kept> {
-    let called = taken_back(first, second, universe).next().map(|(operation, by, at)| Kept {
-        at,
-        does: "calls it".to_owned(),
-        back: format!("`{by}` takes `{operation}` back"),
-        keep: format!("call `{operation}` too: it then stays"),
-    });
-    let sets_too = |property| sets(second).any(|(other, _)| other == property);
-    let set = || {
-        sets(first).find(|(property, _)| !sets_too(*property)).map(|(property, at)| Kept {
-            at,
-            does: "sets it".to_owned(),
-            back: format!("`{property}` is set back"),
-            keep: format!("set `{property}` too"),
-        })
-    };
-    let theirs = brings(second);
-    let brought = || {
-        let alone = |entry: &StateEntry| !theirs.contains(&entry.target) && !theirs.contains(&Target::Default);
-        first.post.iter().find(alone).map(|entry| Kept {
-            at: entry.origin,
-            does: "brings it to a run state".to_owned(),
-            back: format!("the run state of `{}` is taken back", entry.target),
-            keep: format!("bring `{}` to a run state too", entry.target),
-        })
-    };
-    called.or_else(set).or_else(brought)
-}
-
-fn sets(configuration: &Configuration) -> impl Iterator<Item = (MemberRef, Origin)> {
-    configuration.changes.iter().filter_map(|change| match &change.kind {
-        ChangeKind::PropertySet { property, .. } => Some((*property, change.origin)),
-        _ => None,
-    })
-}
-
 fn finding(first: &Configuration, second: &Configuration, kept: &Kept) -> Finding {
-    let message = format!(
-        "`{}` replaces `{}`, and lets go of what that has made safe: {} before it acts",
-        second.id, first.id, kept.back
-    );
-    Finding::warning(CONF_SAFE_LETS_GO, message)
-        .at(second.origin)
-        .also(kept.at, format!("`{}` {} here", first.id, kept.does))
-        .path(format!("configurations.{}.group", second.id))
-        .help(format!("let `{}` {}; or give them no group in common", second.id, kept.keep))
-}
-
-fn moving(first: &Configuration, second: &Configuration, kept: &Kept) -> Finding {
     let message = format!(
         "`{}` is safe, and replaces `{}`, something of which moves when it is taken back: {}",
         second.id, first.id, kept.back
