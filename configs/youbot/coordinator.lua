@@ -14,6 +14,9 @@ local STOPS = { "e_estop", "e_EMERGENCY_STOP", "e_OVERCURRENT", "e_OVERTEMP", "e
 -- robot as well, but for where the very next thing asked of them is to hold by themselves; what lasts is told again.
 local LOSSES = { "e_cmd_watchdog", "e_base_cmd_watchdog", "e_control_lost", "e_watch_lost" }
 
+-- How ending the coupling is answered where it could not be.
+local COUPLED = { "disable_copying.failed", "disable_copying.broken" }
+
 -- Braked, until somebody says how to go on: `e_reset`, or `e_shutdown`, which is heard in every moment. A stop is heard in every
 -- moment as well, and what was said before it is not done any more: whatever moves meanwhile, since an operator insisted, is braked
 -- `again`; one that comes while `safe_hold` is undone does so too, since that may have to wait for what moves, and applies it again when
@@ -25,6 +28,26 @@ local function stopped(more, released)
   local not_braked = { "brake_again.failed", "brake_again.broken" }
   local ended = { "brake_again.undone", "brake_again.undo.failed", "brake_again.undo.broken" }
   local not_released = { "safe_hold.undo.failed", "safe_hold.undo.broken" }
+  local releasing = { entry = { "safe_hold.undo", released },
+    on              = state {},
+    leaving         = state {},
+    stopped         = state {},
+    stopped_leaving = state {},
+    trans { src = "initial", tgt = "on" },
+    trans { src = "on",      tgt = "leaving",         events = { "e_shutdown" } },
+    trans { src = "stopped", tgt = "stopped_leaving", events = { "e_shutdown" } },
+    trans { src = "on",              tgt = "stopped", events = STOPS, effect = "brake_again" },
+    trans { src = "leaving",         tgt = "stopped", events = STOPS, effect = "brake_again" },
+    trans { src = "stopped",         tgt = "stopped", events = STOPS, effect = "brake_again" },
+    trans { src = "stopped_leaving", tgt = "stopped", events = STOPS, effect = "brake_again" },
+    trans { src = "stopped",         tgt = "stopped", events = not_braked },
+    trans { src = "stopped_leaving", tgt = "stopped_leaving", events = not_braked },
+  }
+  if released then
+    -- Both answers may come apart: let go of, and the other one is not there yet.
+    releasing.freed = state {}
+    table.insert(releasing, trans { src = "on", tgt = "freed", events = { "safe_hold.undone" } })
+  end
   local all = {
     braking = state { entry = "safe_hold",
       staying = state {},
@@ -41,21 +64,7 @@ local function stopped(more, released)
       trans { src = "initial", tgt = "on" },
       trans { src = "on",      tgt = "stopped", events = STOPS },
     },
-    releasing = state { entry = { "safe_hold.undo", released },
-      on              = state {},
-      leaving         = state {},
-      stopped         = state {},
-      stopped_leaving = state {},
-      trans { src = "initial", tgt = "on" },
-      trans { src = "on",      tgt = "leaving",         events = { "e_shutdown" } },
-      trans { src = "stopped", tgt = "stopped_leaving", events = { "e_shutdown" } },
-      trans { src = "on",              tgt = "stopped", events = STOPS, effect = "brake_again" },
-      trans { src = "leaving",         tgt = "stopped", events = STOPS, effect = "brake_again" },
-      trans { src = "stopped",         tgt = "stopped", events = STOPS, effect = "brake_again" },
-      trans { src = "stopped_leaving", tgt = "stopped", events = STOPS, effect = "brake_again" },
-      trans { src = "stopped",         tgt = "stopped", events = not_braked },
-      trans { src = "stopped_leaving", tgt = "stopped_leaving", events = not_braked },
-    },
+    releasing = state(releasing),
     trans { src = "initial",                    tgt = "braking" },
     trans { src = ".braking.staying",           tgt = "waiting",            events = braked },
     trans { src = ".braking.leaving",           tgt = ".releasing.leaving", events = braked },
@@ -79,8 +88,8 @@ local function stopped(more, released)
   return state(all)
 end
 
--- Stopped in operation: when it is released the drives are asked to take torques, whatever they did meanwhile.
-local function in_operation(more, released)
+-- Stopped in operation: when it is released (`done` says that) the drives are asked to take torques, whatever they did meanwhile.
+local function in_operation(more, done, released)
   local all = {
     clearing  = state { entry = "clear_faults" },
     resuming  = state { entry = "resume" },
@@ -92,7 +101,7 @@ local function in_operation(more, released)
 
     -- Released, the drives may take torques already: what has died is told from then on, and some of it once.
     trans { src = ".releasing.on",      tgt = ".releasing.stopped", events = LOSSES },
-    trans { src = ".releasing.on",      tgt = "resuming",           events = { "safe_hold.undone" } },
+    trans { src = ".releasing.on",      tgt = "resuming",           events = { done } },
     trans { src = "resuming",           tgt = "braking",            events = STOPS },
     trans { src = "resuming",           tgt = "braking",            events = LOSSES },
     trans { src = "resuming",           tgt = "braking",            events = { "resume.failed", "resume.broken" } },
@@ -277,10 +286,14 @@ return state {
     trans { src = "repairing",          tgt = "waiting",
             events = { "restart_controller.failed", "restart_controller.broken" } },
     trans { src = "repairing",          tgt = ".releasing.leaving", events = { "e_shutdown" } },
-  }),
+  }, "safe_hold.undone"),
 
   -- The same where the coupling could not be ended: without more, the end of the stop would bring it back.
-  fault_coupled = in_operation({}, "disable_copying"),
+  fault_coupled = in_operation({
+    trans { src = ".releasing.freed", tgt = "resuming", events = { "disable_copying.ok" } },
+    trans { src = ".releasing.freed", tgt = "braking",  events = STOPS },
+    trans { src = ".releasing.freed", tgt = "braking",  events = LOSSES },
+  }, "disable_copying.ok", "disable_copying"),
 
   -- Stopped on the way up or on the way back, and on the way down: after `e_reset` it waits to be told what to do.
   halted   = stopped { trans { src = "waiting", tgt = ".releasing.on", events = { "e_reset" } } },
@@ -367,14 +380,19 @@ return state {
           events = { "enable_copying.broken", "disable_copying.failed", "disable_copying.broken" } },
   trans { src = "operational", tgt = "fault.losing", events = { "e_controller_lost" } },
   -- What was asked for in leaving `operational` is answered here.
-  trans { src = "fault",   tgt = "fault_coupled.again", events = { "disable_copying.failed", "disable_copying.broken" } },
-  trans { src = "fault_coupled", tgt = "fault_coupled.again", events = { "disable_copying.failed", "disable_copying.broken" } },
+  trans { src = "fault",   tgt = "fault_coupled.again", events = COUPLED },
+  trans { src = "fault_coupled.braking", tgt = "fault_coupled.again", events = COUPLED },
+  trans { src = "fault_coupled.waiting", tgt = "fault_coupled.again", events = COUPLED },
+  -- It was let go of, and is coupled: it brakes again.
+  trans { src = "fault_coupled.releasing.on",    tgt = "fault_coupled.braking", events = COUPLED },
+  trans { src = "fault_coupled.releasing.freed", tgt = "fault_coupled.braking", events = COUPLED },
   trans { src = "fault.resuming",            tgt = "operational",   events = { "resume.ok" } },
   trans { src = "fault.resuming",            tgt = "shutting_down", events = { "e_shutdown" } },
   trans { src = "fault.releasing.leaving",   tgt = "shutting_down.quieting.released", events = { "safe_hold.undone" } },
   trans { src = "fault_coupled.resuming",          tgt = "operational",   events = { "resume.ok" } },
   trans { src = "fault_coupled.resuming",          tgt = "shutting_down", events = { "e_shutdown" } },
   trans { src = "fault_coupled.releasing.leaving", tgt = "shutting_down.quieting.released", events = { "safe_hold.undone" } },
+  trans { src = "fault_coupled.releasing.freed",   tgt = "shutting_down.quieting.released", events = { "e_shutdown" } },
 
   trans { src = "shutting_down.quieting",     tgt = "lowering", events = STOPS },
   trans { src = "shutting_down.quieting.operated", tgt = "lowering", events = LOSSES },

@@ -45,15 +45,16 @@ impl Engine {
         let before = self.interrupt(id);
         let at = self.given.clock.now();
         // What earlier safe ones will have done counts as done; but what both write only this one does.
-        let Earlier { steps: earlier, unknown, numbers: comes_after } = self.earlier_safe(&request);
+        let was = self.earlier_safe(&request);
+        let (mut earlier, comes_after) = (was.steps(), was.numbers.clone());
         let stack = self.stack_with_earlier();
         let plan = |system: &System, earlier: &[Step]| {
             effort(&with(system, earlier), &stack, configuration, &request, at, &self.given.context)
         };
-        let BestEffort { mut planned, frame, troubles } = plan(&self.world.system, &earlier);
+        let BestEffort { mut planned, mut frame, troubles } = plan(&self.world.system, &earlier);
         // What is on its way to the platform may have come there or not: what this one wants is written either way.
         let mut out = self.values_out();
-        out.extend(unknown);
+        out.extend(was.unknown.iter().cloned());
         let mut here = with(&self.world.system, &out);
         if !out.is_empty() {
             let there = plan(&here, &earlier).planned;
@@ -68,7 +69,11 @@ impl Engine {
             yields |= other.machine.yield_to(planned.steps.iter().map(|planned| &planned.step));
         }
         if yields {
-            planned = plan(&here, &self.earlier_safe(&request).steps).planned;
+            let left = self.earlier_safe(&request);
+            planned = plan(&here, &left.steps()).planned;
+            // What it does in the place of one that it takes over its own frame tells, since nothing of that one may be left.
+            earlier = was.but_for_what_is_taken(&left);
+            frame = plan(&self.world.system, &earlier).frame;
         }
         let mut touched = Touched::default();
         planned.steps.iter().for_each(|planned| touched.add(&planned.step));
@@ -108,7 +113,10 @@ impl Engine {
                     matches!((request.ask, safe.0.ask), (Ask::Apply(one), Ask::Apply(other)) if replaces(one, other));
                 for open in other.machine.still_to_do() {
                     let unknown = anew && open.begun && brings_about(&safe.1, &open.step);
-                    if unknown { &mut earlier.unknown } else { &mut earlier.steps }.push(open.step);
+                    match unknown {
+                        true => earlier.unknown.push(open.step),
+                        false => earlier.counted.push((open.step, anew)),
+                    }
                 }
                 earlier.numbers.push(other.number);
             }
@@ -324,13 +332,26 @@ impl Engine {
 /// What safe configurations that are being applied have still to do about the same things.
 #[derive(Default)]
 struct Earlier {
-    /// Counts as done.
-    steps: Vec<Step>,
-    /// Values and run states that are out, of one whose place is taken: nobody knows yet whether they come to be, and they are done once more. What
+    /// Counts as done; and whether it is of one whose place is taken.
+    counted: Vec<(Step, bool)>,
+    /// Values, run states and connections that are out, of one whose place is taken: nobody knows yet whether they come to be, and they are done once more. What
     /// that one itself takes the place of is taken back by it all the same.
     unknown: Vec<Step>,
     /// Who.
     numbers: SmallVec<[u64; 1]>,
+}
+
+impl Earlier {
+    /// What counts as done.
+    fn steps(&self) -> Vec<Step> {
+        self.counted.iter().map(|(step, _)| step.clone()).collect()
+    }
+
+    /// The same, without what of those whose place is taken is not among `left`.
+    fn but_for_what_is_taken(&self, left: &Self) -> Vec<Step> {
+        let stays = |one: &&(Step, bool)| !one.1 || left.counted.contains(one);
+        self.counted.iter().filter(stays).map(|(step, _)| step.clone()).collect()
+    }
 }
 
 /// The frames whose values one gives back: not what is safe itself, on top of which it is done.
@@ -338,11 +359,13 @@ fn taken_back(planned: &Planned) -> impl Iterator<Item = &Arc<Frame>> {
     planned.popped.iter().filter(|frame| !frame.safe)
 }
 
-/// Whether a frame has brought about this value or run state.
+/// Whether a frame has brought this about, and not what it takes the place of.
 fn brings_about(frame: &Frame, step: &Step) -> bool {
     match step {
         Step::State { component, .. } => frame.moved(*component).is_some(),
-        _ => frame.saved.iter().any(|saved| saved.slot == slot(step)),
+        Step::PropertySet { .. } | Step::PortWrite { .. } => frame.saved.iter().any(|saved| saved.slot == slot(step)),
+        Step::Operation(_) => false,
+        _ => frame.steps().iter().any(|planned| planned.step == *step),
     }
 }
 

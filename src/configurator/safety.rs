@@ -44,6 +44,7 @@ impl Safety {
             let ended = self.pushed.iter().find(|(number, _)| coming(*number) == id);
             ended.map_or(id, |(_, frame)| *frame)
         };
+        edits.over.iter_mut().for_each(|id| *id = real(*id));
         for (id, hand) in &mut edits.pops {
             *id = real(*id);
             hand.renumber(real);

@@ -18,6 +18,7 @@ use crate::plan::{PlanContext, PlannedStep, plan_on};
 use crate::system::{Overlay, System, View};
 use crate::time::Time;
 use rustc_hash::{FxHashMap, FxHashSet};
+use smallvec::smallvec;
 use std::borrow::Cow;
 use std::sync::Arc;
 
@@ -92,12 +93,23 @@ fn on_top(
         beside(Arc::make_mut(&mut by_pieces.planned.steps).as_mut_slice());
         by_pieces
     });
+    // What that one was to take back of others, and did not, is taken back by this one, unless something it has stopped were started for that.
+    if old.partial {
+        let replacing = whole(system, stack, configuration, request, (at, context))?;
+        let wanted = |of: &PlannedStep| straight.planned.steps.iter().any(|planned| planned.step == of.step);
+        let up = |of: &&PlannedStep| {
+            matches!(of.step, Step::State { transition: Transition::Configure | Transition::Start, .. })
+        };
+        if replacing.planned.steps.iter().filter(up).all(wanted) {
+            return Some(replacing);
+        }
+    }
     straight.frame.group = Some(group);
     let frame = Some(Arc::new(straight.frame.clone()));
     let part = &mut straight.planned.parts[0];
     (part.frame, part.edits.push) = (frame.clone(), frame);
     if over(&stack.frames, below, stack.frames.len()).is_some() {
-        part.edits.pops = vec![(old.id, HandOver::default())];
+        part.edits.over = smallvec![old.id];
         straight.planned.popped = vec![old.clone()];
     }
     Some(straight)

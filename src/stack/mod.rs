@@ -183,6 +183,8 @@ pub struct Stack {
 pub struct Edits {
     /// Frames that go.
     pub pops: Vec<(FrameId, HandOver)>,
+    /// Those of something safe that the one which comes takes over, with all that they take back.
+    pub over: SmallVec<[FrameId; 1]>,
     /// Components that their own file takes away: what frames of others did to them is void.
     pub gone: Vec<ComponentName>,
     /// A frame that comes; its number is given when it does.
@@ -357,7 +359,7 @@ impl Stack {
         let mut pushed: Vec<Option<FrameId>> = Vec::new();
         let mut numbers: Vec<(FrameId, FrameId)> = Vec::new();
         let mut busy = SmallVec::<[FrameId; 4]>::from_slice(busy);
-        for Edits { pops, gone, push, waits } in edits {
+        for Edits { pops, gone, push, waits, over: _ } in edits {
             for (id, hand) in pops {
                 let real =
                     |id: FrameId| numbers.iter().rev().find(|(given, _)| *given == id).map_or(id, |(_, real)| *real);
@@ -429,13 +431,9 @@ impl Stack {
 
     /// Pushes the frame of a safe configuration that has been applied as far as it goes, with what goes with it. Frames of what is `broken`
     /// are not squashed, but one of their group takes their place.
-    pub fn push_safe(&mut self, mut edits: Edits, frame: Frame, busy: &[FrameId], broken: &[FrameId]) -> FrameId {
+    pub fn push_safe(&mut self, edits: Edits, frame: Frame, busy: &[FrameId], broken: &[FrameId]) -> FrameId {
         let kept: SmallVec<[FrameId; 4]> = busy.iter().chain(broken).copied().collect();
-        // It takes over what is safe itself.
-        let of_group = |id: FrameId| self.frame(id).is_some_and(|other| other.safe && other.group == frame.group);
-        let taken: SmallVec<[FrameId; 2]> = edits.pops.iter().map(|(id, _)| *id).filter(|id| of_group(*id)).collect();
-        edits.pops.retain(|(id, _)| !taken.contains(id));
-        let busy: SmallVec<[FrameId; 4]> = busy.iter().copied().filter(|id| !taken.contains(id)).collect();
+        let busy: SmallVec<[FrameId; 4]> = busy.iter().copied().filter(|id| !edits.over.contains(id)).collect();
         let push = Some(Arc::new(Frame { safe: true, ..frame }));
         let (bound, waits) = (self.bound, edits.waits);
         // Two of a group are one before they count.

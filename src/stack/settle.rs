@@ -4,8 +4,10 @@
 //! it was decided for a system in which that one is done. Where a safe configuration interrupts a group all of it ends.
 
 use super::effort::without;
+use super::squash::list;
 use super::{Edits, Frame, FrameId, Group, Request, Why, World};
 use crate::model::{Ask, Step, Verdict};
+use crate::plan::undo::DraftStep;
 use smallvec::SmallVec;
 
 /// How a part of a group has ended.
@@ -169,8 +171,13 @@ impl World {
         let there = |frame: &FrameId| stack.frame(*frame).is_some();
         let broken: Vec<FrameId> = self.broken.iter().filter_map(|broken| broken.frame).filter(there).collect();
         let group = frame.group;
-        let gone: SmallVec<[FrameId; 2]> = edits.pops.iter().map(|(frame, _)| *frame).collect();
+        let gone: SmallVec<[FrameId; 2]> =
+            edits.pops.iter().map(|(frame, _)| *frame).chain(edits.over.clone()).collect();
         let before = if self.broken.is_empty() { Vec::new() } else { self.stack.frames().to_vec() };
+        if !before.is_empty() {
+            // Its own undo leads back from there, beside what is broken.
+            self.expects_back(&connections(&frame));
+        }
         let pushed = self.stack.push_safe(edits, frame, &busy, &broken);
         if !before.is_empty() {
             let after = self.stack.clone();
@@ -198,6 +205,16 @@ impl World {
             }
         }
     }
+}
+
+/// The connections that a frame has made and taken away.
+fn connections(frame: &Frame) -> Vec<Step> {
+    let made = |item: &DraftStep| match (&item.step, item.was) {
+        (Step::Connect { from, to, .. }, _) => Some(Step::Disconnect { from: *from, to: *to }),
+        (Step::Disconnect { from, to }, Some(policy)) => Some(Step::Connect { from: *from, to: *to, policy }),
+        _ => None,
+    };
+    list(frame).iter().rev().filter_map(made).collect()
 }
 
 impl Request {

@@ -117,3 +117,196 @@ fn however_they_come_and_whatever_fails_the_end_takes_all_of_it_back() {
         }
     }
 }
+
+const ARM: &str = "davit: 1
+name: arm
+platform: simulated
+types:
+  Motor:
+    actuator: true
+    moves: [start]
+    ports: { speed: { direction: in, type: float }, ref: { direction: in, type: float } }
+    operations:
+      brake: { effect: { undo: release } }
+      release: { effect: { undo: brake } }
+      clamp: { effect: { undo: unclamp } }
+      unclamp: { effect: { undo: clamp } }
+  Lamp: { ports: { o: { direction: out, type: float } } }
+configurations: [c.yaml]
+coordinator: k.yaml
+safety: [e_stop, e_halt]
+deploy: { event: e_start, up: up.idle, failed: [failed], within_s: 5 }
+shutdown: { event: e_end, down: off, within_s: 30 }
+";
+
+const CHART: &str = "coordinator:
+  states:
+    off: {}
+    up:
+      states: { building: { entry: build }, starting: { entry: run }, idle: { IDLE } }
+      transitions:
+        - { src: initial, tgt: building }
+        - { src: building, tgt: starting, events: [build.ok] }
+        - { src: starting, tgt: idle, events: [run.ok] }
+    rest: {}
+    failed: {}
+    left: {}
+    stopped: { config: stop }
+    halted: { config: halt }
+    down:
+      states:
+        letting: { entry: [stop.undo, halt.undo] }
+        stopping: { entry: run.undo }
+        removing: { entry: build.undo }
+      transitions:
+        - { src: initial, tgt: letting }
+        - { src: letting, tgt: stopping, events: [stop.undone, stop.undo.failed, stop.undo.broken] }
+        - { src: stopping, tgt: removing, events: [run.undone, run.undo.failed, run.undo.broken] }
+  transitions:
+    - { src: initial, tgt: off }
+    - { src: off, tgt: up, events: [e_start] }
+    - { src: up, tgt: failed, events: [build.failed, build.broken, run.failed, run.broken, slow.failed, slow.broken] }
+    - { src: up, tgt: stopped, events: [e_stop] }
+    - { src: up, tgt: halted, events: [e_halt] }
+    - { src: up, tgt: down, events: [e_end] }
+    - { src: rest, tgt: down, events: [e_end] }
+    - { src: rest, tgt: stopped, events: [e_stop] }
+    - { src: rest, tgt: halted, events: [e_halt] }
+    - { src: failed, tgt: stopped, events: [e_stop] }
+    - { src: failed, tgt: halted, events: [e_halt] }
+    - { src: failed, tgt: down, events: [e_end] }
+    - { src: left, tgt: stopped, events: [e_stop] }
+    - { src: left, tgt: halted, events: [e_halt] }
+    - { src: left, tgt: down, events: [e_end] }
+    - { src: down, tgt: stopped, events: [e_stop] }
+    - { src: down, tgt: halted, events: [e_halt] }
+    - { src: stopped, tgt: stopped, events: [e_stop] }
+    - { src: stopped, tgt: halted, events: [e_halt] }
+    - { src: stopped, tgt: down, events: [e_end] }
+    - { src: halted, tgt: stopped, events: [e_stop] }
+    - { src: halted, tgt: halted, events: [e_halt] }
+    - { src: halted, tgt: down, events: [e_end] }
+    - { src: stopped, tgt: rest, events: [e_reset] }
+    - { src: halted, tgt: rest, events: [e_reset] }
+    - { src: down, tgt: off, events: [build.undone] }
+    - { src: down, tgt: left, events: [build.undo.failed, build.undo.broken] }
+";
+
+/// What the first one did not come to is made up for by the one that takes its place: what it was to take back of something that is not safe, and what
+/// it has out. What nobody knows of it stands in nobody's way who lets go.
+#[test]
+fn what_the_first_one_missed_is_made_up_for_and_the_end_takes_all_of_it_back() {
+    let motor = "build: { changes: [{ create: { component: m, type: Motor } }] }";
+    let both = "build: { changes: [{ create: { component: m, type: Motor } }, { create: { component: l, type: Lamp } },
+      { connect: { from: l.o, to: m.ref, policy: data } }] }";
+    let run = "run: { pre_conf_state: [\"m:stopped\"], post_conf_state: [\"m:running\"] }";
+    let starts = "run: { pre_conf_state: [\"m:stopped\"] }";
+    let group = "safe: true, group: speed";
+    let slow = "slow: { group: speed, changes: [{ port_write: { port: m.speed, value: 0.4 } }] }";
+    let clamped = "slow: { group: speed, changes: [{ port_write: { port: m.speed, value: 0.4 } }, { operation_call: { operation: m.clamp } }] }";
+    let driven = "slow: { group: speed, changes: [{ port_write: { port: m.speed, value: 0.4 } }], post_conf_state: [\"m:running\"] }";
+    let safe = |name: &str, what: &str| format!("{name}: {{ {group}, {what} }}");
+    let brake = "changes: [{ operation_call: { operation: m.brake } }]";
+    let apart = "changes: [{ disconnect: { from: l.o, to: m.ref } }]";
+    let clamp = "changes: [{ operation_call: { operation: m.clamp } }], post_conf_state: [\"m:stopped\"]";
+    let still = "changes: [{ port_write: { port: m.speed, value: 0.0 } }]";
+    let down = "post_conf_state: [\"m:unconfigured\"]";
+    let lost = |step: &str| format!("fault('{step}', 'lost', 1)");
+    let fails = |step: &str| format!("fault('{step}', 'fail', 1)");
+    // What there is, what `stop` and `halt` do, what goes wrong, what comes when, and how it is while it is held, and after the end.
+    let table = [
+        (
+            [both, run, slow],
+            "",
+            apart,
+            brake,
+            lost("operation_call m.brake"),
+            "halt 2 stop 2 halt 3",
+            "running nil 0",
+            "running nil 1 0",
+        ),
+        (
+            [both, run, slow],
+            "",
+            apart,
+            brake,
+            lost("operation_call m.brake"),
+            "halt 0.5 stop 0.5 halt 3",
+            "running nil 0",
+            "running nil 1 0",
+        ),
+        (
+            [both, run, slow],
+            "",
+            apart,
+            brake,
+            lost("disconnect l.o"),
+            "stop 0.5 stop 3",
+            "running nil 0",
+            "running nil 1 0",
+        ),
+        (
+            [motor, run, slow],
+            "config: slow",
+            still,
+            brake,
+            fails("port_write m.speed"),
+            "stop 0.5 halt 2",
+            "running nil 0",
+            "running nil 0 0",
+        ),
+        (
+            [motor, run, clamped],
+            "config: slow",
+            brake,
+            still,
+            fails("port_write m.speed"),
+            "stop 0.5 stop 2",
+            "running nil 0",
+            "running nil 0 0",
+        ),
+        (
+            [motor, starts, driven],
+            "config: slow",
+            brake,
+            still,
+            fails("stop m"),
+            "stop 0.5 stop 2",
+            "stopped nil 0",
+            "stopped nil 0 0",
+        ),
+        (
+            [motor, run, slow],
+            "",
+            down,
+            clamp,
+            lost("operation_call m.clamp"),
+            "halt 0.05 stop 2",
+            "unconfigured nil 0",
+            "running nil 0 0",
+        ),
+    ];
+    for (base, idle, stop, halt, fault, events, held, end) in table {
+        let demo = Demo::new();
+        demo.write("deployment.yaml", ARM);
+        demo.write("k.yaml", &CHART.replace("IDLE", idle));
+        let all = [base.map(str::to_owned).to_vec(), vec![safe("stop", stop), safe("halt", halt)]].concat();
+        demo.write("c.yaml", &format!("configurations:\n  {}\n", all.join("\n  ")));
+        let words: Vec<&str> = events.split(' ').collect();
+        let raised: Vec<String> =
+            words.chunks(2).map(|two| format!("raise('e_{}') wait({})", two[0], two[1])).collect();
+        let script = format!(
+            "local function told(more) say(state('m') .. ' ' .. tostring(port('m.speed')) .. ' ' .. #system().connections .. more) end
+             deploy('deployment.yaml') wait(0.2) {fault} {}
+             told('')
+             raise('e_reset') wait(3)
+             told(' ' .. #drift())
+             shutdown()",
+            raised.join(" ")
+        );
+        demo.write("s.lua", &script);
+        let ran = demo.run(&["run", "s.lua", "--clock", "simulated", "--quiet"]);
+        let told: Vec<&str> = ran.out.lines().collect();
+        assert_eq!((told.as_slice(), ran.code), (&[held, end][..], 0), "{all:#?} {fault} {events}\n{}", ran.err);
+    }
+}
