@@ -20,15 +20,16 @@ local COUPLED = { "disable_copying.failed", "disable_copying.broken" }
 -- Braked, until somebody says how to go on: `e_reset`, or `e_shutdown`, which is heard in every moment. A stop is heard in every
 -- moment as well, and what was said before it is not done any more: whatever moves meanwhile, since an operator insisted, is braked
 -- `again`; one that comes while `safe_hold` is undone does so too, since that may have to wait for what moves, and applies it again when
--- that is answered. `more`: what is particular to a place. `released`: what is asked for in the step in which it is let go of, so that both are
--- one, and nothing is in between.
-local function stopped(more, released)
+-- that is answered. `more`: what is particular to a place. `uncouples`: it may have copied. Then the coupling is ended once more in the step in which it is
+-- let go of: what became of that when `copying` was left is not known here (it may have been interrupted), and the end of the stop brings back what it
+-- had found.
+local function stopped(more, uncouples)
   local braked = { "safe_hold.ok", "safe_hold.failed", "safe_hold.broken" }
   local braked_again = { "brake_again.ok", "brake_again.failed", "brake_again.broken" }
   local not_braked = { "brake_again.failed", "brake_again.broken" }
   local ended = { "brake_again.undone", "brake_again.undo.failed", "brake_again.undo.broken" }
   local not_released = { "safe_hold.undo.failed", "safe_hold.undo.broken" }
-  local releasing = { entry = { "safe_hold.undo", released },
+  local releasing = { entry = { "safe_hold.undo", uncouples and "disable_copying" },
     on              = state {},
     leaving         = state {},
     stopped         = state {},
@@ -43,7 +44,7 @@ local function stopped(more, released)
     trans { src = "stopped",         tgt = "stopped", events = not_braked },
     trans { src = "stopped_leaving", tgt = "stopped_leaving", events = not_braked },
   }
-  if released then
+  if uncouples then
     -- Both answers may come apart: let go of, and the other one is not there yet.
     releasing.freed = state {}
     table.insert(releasing, trans { src = "on", tgt = "freed", events = { "safe_hold.undone" } })
@@ -82,34 +83,21 @@ local function stopped(more, released)
     trans { src = ".releasing.stopped",         tgt = "again",              events = not_released },
     trans { src = ".releasing.stopped_leaving", tgt = "again",              events = not_released },
   }
+  if uncouples then
+    table.insert(all, trans { src = ".releasing.freed", tgt = "braking", events = STOPS })
+    table.insert(all, trans { src = ".releasing.freed", tgt = "braking", events = LOSSES })
+    -- It was let go of, and is coupled: it brakes again.
+    table.insert(all, trans { src = ".releasing.on",    tgt = "braking", events = COUPLED })
+    table.insert(all, trans { src = ".releasing.freed", tgt = "braking", events = COUPLED })
+    -- What was asked for in leaving `operational` is answered here.
+    for _, braked in ipairs{ "braking", "waiting", "again", "ending" } do
+      table.insert(all, trans { src = braked, tgt = "again", events = COUPLED })
+    end
+  end
   for name, particular in pairs(more) do
     if type(name) == "number" then table.insert(all, particular) else all[name] = particular end
   end
   return state(all)
-end
-
--- Stopped in operation: when it is released (`done` says that) the drives are asked to take torques, whatever they did meanwhile.
-local function in_operation(more, done, released)
-  local all = {
-    clearing  = state { entry = "clear_faults" },
-    resuming  = state { entry = "resume" },
-    trans { src = "waiting",            tgt = "clearing",           events = { "e_reset" } },
-    trans { src = "clearing",           tgt = "again",              events = STOPS },
-    trans { src = "clearing",           tgt = ".releasing.on",      events = { "clear_faults.ok" } },
-    trans { src = "clearing",           tgt = "waiting",            events = { "clear_faults.failed", "clear_faults.broken" } },
-    trans { src = "clearing",           tgt = ".releasing.leaving", events = { "e_shutdown" } },
-
-    -- Released, the drives may take torques already: what has died is told from then on, and some of it once.
-    trans { src = ".releasing.on",      tgt = ".releasing.stopped", events = LOSSES },
-    trans { src = ".releasing.on",      tgt = "resuming",           events = { done } },
-    trans { src = "resuming",           tgt = "braking",            events = STOPS },
-    trans { src = "resuming",           tgt = "braking",            events = LOSSES },
-    trans { src = "resuming",           tgt = "braking",            events = { "resume.failed", "resume.broken" } },
-  }
-  for name, particular in pairs(more) do
-    if type(name) == "number" then table.insert(all, particular) else all[name] = particular end
-  end
-  return stopped(all, released)
 end
 
 -- A step of the way down that is not asked for twice: a stop leaves it only with its answer.
@@ -261,7 +249,8 @@ return state {
 
   -- Stopped in operation. When it is released the drives are asked to take torques, whatever they did meanwhile, and nothing
   -- couples before the arms are aligned again.
-  fault = in_operation({
+  fault = stopped({
+    clearing  = state { entry = "clear_faults" },
     losing    = state { entry = "safe_hold",
       on      = state {},
       staying = state {},
@@ -273,6 +262,13 @@ return state {
       trans { src = "staying", tgt = "leaving", events = { "e_shutdown" } },
     },
     repairing = state { entry = "restart_controller" },
+    resuming  = state { entry = "resume" },
+    trans { src = "waiting",            tgt = "clearing",           events = { "e_reset" } },
+    trans { src = "clearing",           tgt = "again",              events = STOPS },
+    trans { src = "clearing",           tgt = "again",              events = COUPLED },
+    trans { src = "clearing",           tgt = ".releasing.on",      events = { "clear_faults.ok" } },
+    trans { src = "clearing",           tgt = "waiting",            events = { "clear_faults.failed", "clear_faults.broken" } },
+    trans { src = "clearing",           tgt = ".releasing.leaving", events = { "e_shutdown" } },
 
     -- The controller itself stopped: the same, then it is started again without asking anybody.
     trans { src = ".losing.on",         tgt = "repairing",          events = { "safe_hold.ok" } },
@@ -286,14 +282,18 @@ return state {
     trans { src = "repairing",          tgt = "waiting",
             events = { "restart_controller.failed", "restart_controller.broken" } },
     trans { src = "repairing",          tgt = ".releasing.leaving", events = { "e_shutdown" } },
-  }, "safe_hold.undone"),
+    trans { src = "losing",             tgt = "braking",            events = COUPLED },
+    trans { src = "repairing",          tgt = "again",              events = COUPLED },
 
-  -- The same where the coupling could not be ended: without more, the end of the stop would bring it back.
-  fault_coupled = in_operation({
-    trans { src = ".releasing.freed", tgt = "resuming", events = { "disable_copying.ok" } },
-    trans { src = ".releasing.freed", tgt = "braking",  events = STOPS },
-    trans { src = ".releasing.freed", tgt = "braking",  events = LOSSES },
-  }, "disable_copying.ok", "disable_copying"),
+    -- Released, the drives may take torques already: what has died is told from then on, and some of it once.
+    trans { src = ".releasing.on",      tgt = ".releasing.stopped", events = LOSSES },
+    trans { src = ".releasing.on",      tgt = "resuming",           events = { "disable_copying.ok" } },
+    trans { src = ".releasing.freed",   tgt = "resuming",           events = { "disable_copying.ok" } },
+    trans { src = "resuming",           tgt = "braking",            events = STOPS },
+    trans { src = "resuming",           tgt = "braking",            events = LOSSES },
+    trans { src = "resuming",           tgt = "braking",            events = { "resume.failed", "resume.broken" } },
+    trans { src = "resuming",           tgt = "braking",            events = COUPLED },
+  }, true),
 
   -- Stopped on the way up or on the way back, and on the way down: after `e_reset` it waits to be told what to do.
   halted   = stopped { trans { src = "waiting", tgt = ".releasing.on", events = { "e_reset" } } },
@@ -375,24 +375,13 @@ return state {
   trans { src = "operational", tgt = "fault", events = STOPS },
   trans { src = "operational", tgt = "fault", events = LOSSES },
   trans { src = "operational", tgt = "fault",
-          events = { "e_drives_let_go", "five_DOF.failed", "five_DOF.broken", "eight_DOF.broken", "base_stop.failed", "base_stop.broken" } },
-  trans { src = "operational", tgt = "fault_coupled",
-          events = { "enable_copying.broken", "disable_copying.failed", "disable_copying.broken" } },
+          events = { "e_drives_let_go", "five_DOF.failed", "five_DOF.broken", "eight_DOF.broken", "base_stop.failed", "base_stop.broken",
+                     "enable_copying.broken", "disable_copying.failed", "disable_copying.broken" } },
   trans { src = "operational", tgt = "fault.losing", events = { "e_controller_lost" } },
-  -- What was asked for in leaving `operational` is answered here.
-  trans { src = "fault",   tgt = "fault_coupled.again", events = COUPLED },
-  trans { src = "fault_coupled.braking", tgt = "fault_coupled.again", events = COUPLED },
-  trans { src = "fault_coupled.waiting", tgt = "fault_coupled.again", events = COUPLED },
-  -- It was let go of, and is coupled: it brakes again.
-  trans { src = "fault_coupled.releasing.on",    tgt = "fault_coupled.braking", events = COUPLED },
-  trans { src = "fault_coupled.releasing.freed", tgt = "fault_coupled.braking", events = COUPLED },
   trans { src = "fault.resuming",            tgt = "operational",   events = { "resume.ok" } },
   trans { src = "fault.resuming",            tgt = "shutting_down", events = { "e_shutdown" } },
   trans { src = "fault.releasing.leaving",   tgt = "shutting_down.quieting.released", events = { "safe_hold.undone" } },
-  trans { src = "fault_coupled.resuming",          tgt = "operational",   events = { "resume.ok" } },
-  trans { src = "fault_coupled.resuming",          tgt = "shutting_down", events = { "e_shutdown" } },
-  trans { src = "fault_coupled.releasing.leaving", tgt = "shutting_down.quieting.released", events = { "safe_hold.undone" } },
-  trans { src = "fault_coupled.releasing.freed",   tgt = "shutting_down.quieting.released", events = { "e_shutdown" } },
+  trans { src = "fault.releasing.freed",     tgt = "shutting_down.quieting.released", events = { "e_shutdown" } },
 
   trans { src = "shutting_down.quieting",     tgt = "lowering", events = STOPS },
   trans { src = "shutting_down.quieting.operated", tgt = "lowering", events = LOSSES },

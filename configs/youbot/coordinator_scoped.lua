@@ -14,16 +14,43 @@ local STOPS = { "e_estop", "e_EMERGENCY_STOP", "e_OVERCURRENT", "e_OVERTEMP", "e
 -- robot as well, but for where the very next thing asked of them is to hold by themselves; what lasts is told again.
 local LOSSES = { "e_cmd_watchdog", "e_base_cmd_watchdog", "e_control_lost", "e_watch_lost" }
 
+-- How ending the coupling is answered where it could not be: with the state that it belongs to, and by itself.
+local NOT_ENDED = { "enable_copying.undo.failed", "enable_copying.undo.broken", "eight_DOF.undo.failed", "eight_DOF.undo.broken",
+                    "five_DOF.undo.failed", "five_DOF.undo.broken" }
+local COUPLED = { "disable_copying.failed", "disable_copying.broken" }
+
 -- Braked, until somebody says how to go on: `e_reset`, or `e_shutdown`, which is heard in every moment. A stop is heard in every
 -- moment as well, and what was said before it is not done any more: whatever moves meanwhile, since an operator insisted, is braked
 -- `again`; one that comes while `safe_hold` is undone does so too, since that may have to wait for what moves, and applies it again when
--- that is answered. `more`: what is particular to a place.
-local function stopped(more)
+-- that is answered. `more`: what is particular to a place. `uncouples`: it may have copied. Then the coupling is ended once more in the step in which it is
+-- let go of: what became of that when `copying` was left is not known here (it may have been interrupted), and the end of the stop brings back what it
+-- had found.
+local function stopped(more, uncouples)
   local braked = { "safe_hold.ok", "safe_hold.failed", "safe_hold.broken" }
   local braked_again = { "brake_again.ok", "brake_again.failed", "brake_again.broken" }
   local not_braked = { "brake_again.failed", "brake_again.broken" }
   local ended = { "brake_again.undone", "brake_again.undo.failed", "brake_again.undo.broken" }
   local not_released = { "safe_hold.undo.failed", "safe_hold.undo.broken" }
+  local releasing = { entry = { "safe_hold.undo", uncouples and "disable_copying" },
+    on              = state {},
+    leaving         = state {},
+    stopped         = state {},
+    stopped_leaving = state {},
+    trans { src = "initial", tgt = "on" },
+    trans { src = "on",      tgt = "leaving",         events = { "e_shutdown" } },
+    trans { src = "stopped", tgt = "stopped_leaving", events = { "e_shutdown" } },
+    trans { src = "on",              tgt = "stopped", events = STOPS, effect = "brake_again" },
+    trans { src = "leaving",         tgt = "stopped", events = STOPS, effect = "brake_again" },
+    trans { src = "stopped",         tgt = "stopped", events = STOPS, effect = "brake_again" },
+    trans { src = "stopped_leaving", tgt = "stopped", events = STOPS, effect = "brake_again" },
+    trans { src = "stopped",         tgt = "stopped", events = not_braked },
+    trans { src = "stopped_leaving", tgt = "stopped_leaving", events = not_braked },
+  }
+  if uncouples then
+    -- Both answers may come apart: let go of, and the other one is not there yet.
+    releasing.freed = state {}
+    table.insert(releasing, trans { src = "on", tgt = "freed", events = { "safe_hold.undone" } })
+  end
   local all = {
     braking = state { entry = "safe_hold",
       staying = state {},
@@ -40,21 +67,7 @@ local function stopped(more)
       trans { src = "initial", tgt = "on" },
       trans { src = "on",      tgt = "stopped", events = STOPS },
     },
-    releasing = state { entry = "safe_hold.undo",
-      on              = state {},
-      leaving         = state {},
-      stopped         = state {},
-      stopped_leaving = state {},
-      trans { src = "initial", tgt = "on" },
-      trans { src = "on",      tgt = "leaving",         events = { "e_shutdown" } },
-      trans { src = "stopped", tgt = "stopped_leaving", events = { "e_shutdown" } },
-      trans { src = "on",              tgt = "stopped", events = STOPS, effect = "brake_again" },
-      trans { src = "leaving",         tgt = "stopped", events = STOPS, effect = "brake_again" },
-      trans { src = "stopped",         tgt = "stopped", events = STOPS, effect = "brake_again" },
-      trans { src = "stopped_leaving", tgt = "stopped", events = STOPS, effect = "brake_again" },
-      trans { src = "stopped",         tgt = "stopped", events = not_braked },
-      trans { src = "stopped_leaving", tgt = "stopped_leaving", events = not_braked },
-    },
+    releasing = state(releasing),
     trans { src = "initial",                    tgt = "braking" },
     trans { src = ".braking.staying",           tgt = "waiting",            events = braked },
     trans { src = ".braking.leaving",           tgt = ".releasing.leaving", events = braked },
@@ -72,6 +85,17 @@ local function stopped(more)
     trans { src = ".releasing.stopped",         tgt = "again",              events = not_released },
     trans { src = ".releasing.stopped_leaving", tgt = "again",              events = not_released },
   }
+  if uncouples then
+    table.insert(all, trans { src = ".releasing.freed", tgt = "braking", events = STOPS })
+    table.insert(all, trans { src = ".releasing.freed", tgt = "braking", events = LOSSES })
+    -- It was let go of, and is coupled: it brakes again.
+    table.insert(all, trans { src = ".releasing.on",    tgt = "braking", events = COUPLED })
+    table.insert(all, trans { src = ".releasing.freed", tgt = "braking", events = COUPLED })
+    -- What was asked for in leaving `operational` is answered here.
+    for _, braked in ipairs{ "braking", "waiting", "again", "ending" } do
+      table.insert(all, trans { src = braked, tgt = "again", events = NOT_ENDED })
+    end
+  end
   for name, particular in pairs(more) do
     if type(name) == "number" then table.insert(all, particular) else all[name] = particular end
   end
@@ -227,7 +251,7 @@ return state {
 
   -- Stopped in operation. When it is released the drives are asked to take torques, whatever they did meanwhile, and nothing
   -- couples before the arms are aligned again.
-  fault = stopped {
+  fault = stopped({
     clearing  = state { entry = "clear_faults" },
     losing    = state { entry = "safe_hold",
       on      = state {},
@@ -243,6 +267,7 @@ return state {
     resuming  = state { entry = "resume" },
     trans { src = "waiting",            tgt = "clearing",           events = { "e_reset" } },
     trans { src = "clearing",           tgt = "again",              events = STOPS },
+    trans { src = "clearing",           tgt = "again",              events = NOT_ENDED },
     trans { src = "clearing",           tgt = ".releasing.on",      events = { "clear_faults.ok" } },
     trans { src = "clearing",           tgt = "waiting",            events = { "clear_faults.failed", "clear_faults.broken" } },
     trans { src = "clearing",           tgt = ".releasing.leaving", events = { "e_shutdown" } },
@@ -259,14 +284,18 @@ return state {
     trans { src = "repairing",          tgt = "waiting",
             events = { "restart_controller.failed", "restart_controller.broken" } },
     trans { src = "repairing",          tgt = ".releasing.leaving", events = { "e_shutdown" } },
+    trans { src = "losing",             tgt = "braking",            events = NOT_ENDED },
+    trans { src = "repairing",          tgt = "again",              events = NOT_ENDED },
 
     -- Released, the drives may take torques already: what has died is told from then on, and some of it once.
     trans { src = ".releasing.on",      tgt = ".releasing.stopped", events = LOSSES },
-    trans { src = ".releasing.on",      tgt = "resuming",           events = { "safe_hold.undone" } },
+    trans { src = ".releasing.on",      tgt = "resuming",           events = { "disable_copying.ok" } },
+    trans { src = ".releasing.freed",   tgt = "resuming",           events = { "disable_copying.ok" } },
     trans { src = "resuming",           tgt = "braking",            events = STOPS },
     trans { src = "resuming",           tgt = "braking",            events = LOSSES },
     trans { src = "resuming",           tgt = "braking",            events = { "resume.failed", "resume.broken" } },
-  },
+    trans { src = "resuming",           tgt = "braking",            events = NOT_ENDED },
+  }, true),
 
   -- Stopped on the way up or on the way back, and on the way down: after `e_reset` it waits to be told what to do.
   halted   = stopped { trans { src = "waiting", tgt = ".releasing.on", events = { "e_reset" } } },
@@ -352,13 +381,10 @@ return state {
                      "enable_copying.broken", "enable_copying.undo.failed", "enable_copying.undo.broken",
                      "eight_DOF.undo.failed", "eight_DOF.undo.broken", "five_DOF.undo.failed", "five_DOF.undo.broken" } },
   trans { src = "operational", tgt = "fault.losing", events = { "e_controller_lost" } },
-  -- What was asked for in leaving `operational` is answered here.
-  trans { src = "fault", tgt = "fault.again",
-          events = { "enable_copying.undo.failed", "enable_copying.undo.broken", "eight_DOF.undo.failed", "eight_DOF.undo.broken",
-                     "five_DOF.undo.failed", "five_DOF.undo.broken" } },
   trans { src = "fault.resuming",           tgt = "operational",   events = { "resume.ok" } },
   trans { src = "fault.resuming",           tgt = "shutting_down", events = { "e_shutdown" } },
   trans { src = "fault.releasing.leaving",  tgt = "shutting_down.quieting.released", events = { "safe_hold.undone" } },
+  trans { src = "fault.releasing.freed",    tgt = "shutting_down.quieting.released", events = { "e_shutdown" } },
 
   trans { src = "shutting_down.quieting",     tgt = "lowering", events = STOPS },
   trans { src = "shutting_down.quieting.operated", tgt = "lowering", events = LOSSES },

@@ -23,6 +23,7 @@ local function record(name, every)
     signals[TOOL[i]] = "Plant.tool.p[" .. i - 1 .. "]"
     signals[HANDLE[i]] = "Leader.tool.p[" .. i - 1 .. "]"
     signals["v" .. i] = "Plant.tool.v[" .. i - 1 .. "]"
+    signals["f" .. i] = "Follower.wrench[" .. i - 1 .. "]"
   end
   return sample{ every = every, name = name, signals = signals }
 end
@@ -216,6 +217,11 @@ expect{ name = "the reference jumps: noticed after", value = 1000 * (now() - at)
 wait_answer("base_stop.ok", 0.01)
 wait_state("soft_stop", 0)
 stays("the reference jumps", s, at)
+local step, f = 0, { s:values("f1"), s:values("f2"), s:values("f3") }
+for k = 2, #f[1] do
+  step = math.max(step, math.sqrt((f[1][k] - f[1][k - 1])^2 + (f[2][k] - f[2][k - 1])^2 + (f[3][k] - f[3][k - 1])^2))
+end
+expect{ name = "the reference jumps: force in 1 ms", value = step, max = 0.5, unit = "N" }
 raise("e_reset")
 couple()
 

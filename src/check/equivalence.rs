@@ -136,6 +136,7 @@ fn same_frame(a: &Frame, b: &Frame) -> bool {
         && (a.left, a.partial, a.safe, &a.floor) == (b.left, b.partial, b.safe, &b.floor)
         && a.parts == b.parts
         && a.saved == b.saved
+        && a.owes == b.owes
         && same_inverse(&a.inverse, &b.inverse)
         && (Arc::ptr_eq(&a.footprint, &b.footprint) || a.footprint == b.footprint)
 }

@@ -58,6 +58,7 @@ use crate::app::Extensions;
 use crate::diagnostics::{SourceMap, to_json};
 use crate::model::codes::CLI_UNWRITABLE;
 use crate::model::{Code, Finding, Findings};
+use crate::time::NoThread;
 use clap::{FromArgMatches, Parser};
 use exit::Exit;
 use output::{Color, Output};
@@ -258,10 +259,13 @@ fn run(extensions: Extensions) -> ExitCode {
     let exit = match ran {
         Ok(Ok(exit)) => exit,
         Ok(Err(failure)) => tell(context.out, failure, answers),
-        Err(panic) => {
-            last_words::end();
-            resume_unwind(panic);
-        }
+        Err(panic) => match panic.downcast::<NoThread>() {
+            Ok(none) => tell(context.out, deploy::short(none.0), answers),
+            Err(panic) => {
+                last_words::end();
+                resume_unwind(panic);
+            }
+        },
     };
     last_words::end();
     let exit = written(context.out, exit);

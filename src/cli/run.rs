@@ -98,9 +98,10 @@ impl Run for Args {
         let watch = {
             let (stopped, left) = (progress.clone(), progress.clone());
             let (stops, leaving) = (interrupt.clone(), leaving.clone());
-            let stop = move |force| {
+            let stop = move |force: bool| {
+                let nothing = !force && !stops.has_deployed();
                 stops.stop(force);
-                stopped.line(signals::told(force));
+                stopped.line(if nothing { "the script ends; nothing of it is deployed" } else { signals::told(force) });
             };
             let held = {
                 let interrupt = interrupt.clone();

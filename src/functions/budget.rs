@@ -1,6 +1,7 @@
 //! What one call may take.
 
 use super::count::Count;
+use super::errors::placed;
 use super::exact;
 #[cfg(target_os = "linux")]
 use super::watch::CallWatch;
@@ -74,7 +75,14 @@ impl Budget {
         self.count.begin(limit);
         let outcome = exact::during(&self.count, || self.watched(call));
         drop(leave);
-        self.count.end().map_or(outcome, Err)
+        match self.count.end() {
+            // What it was doing then is where to look.
+            Some(used_up) => Err(match &outcome {
+                Err(at) => placed(used_up, at),
+                Ok(_) => used_up,
+            }),
+            None => outcome,
+        }
     }
 
     #[cfg(target_os = "linux")]

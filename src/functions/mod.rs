@@ -37,7 +37,7 @@ mod world;
 pub use aside::Field;
 pub use budget::Budget;
 pub use count::{INTERRUPTED, processor_time};
-pub use errors::{Short, message_within};
+pub use errors::{Short, message_within, place_of, text_of};
 pub use guards::{Guards, install as guard, loops};
 #[cfg(any(test, feature = "internals"))]
 pub use lab::Lab;

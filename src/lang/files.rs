@@ -121,7 +121,13 @@ impl Sources {
         let shown = if folder.as_os_str().is_empty() { Path::new(".") } else { &folder };
         let Some(names) = self.inside(shown) else { return format!("there is no folder {} either", shown.display()) };
         let name = path.file_name().and_then(|n| n.to_str()).unwrap_or_default();
-        let near = |names: &[String]| did_you_mean(name, "files", names.iter().map(String::as_str));
+        let near = |names: &[String]| {
+            // A script is meant where a script is looked for.
+            let same = |name: &&str| language(Path::new(name)).is_some() && language(Path::new(name)) == language(path);
+            let alike: Vec<&str> = names.iter().map(String::as_str).filter(same).collect();
+            let all = || names.iter().map(String::as_str).collect();
+            did_you_mean(name, "files", if alike.is_empty() { all() } else { alike }.into_iter())
+        };
         if !names.is_empty() {
             return near(&names);
         }

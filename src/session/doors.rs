@@ -30,10 +30,10 @@ struct InsideDoor {
 }
 
 /// One that is let in, and finds no thread: the system has none left.
-type Waiting = (Arc<SocketConnection>, DoorPlace);
+pub(super) type Waiting = (Arc<SocketConnection>, DoorPlace);
 
 /// A place, until it is dropped.
-struct DoorPlace {
+pub(super) struct DoorPlace {
     doors: Arc<Doors>,
     /// Whose it is, where it is a kept one.
     kept: Option<libc::pid_t>,
@@ -97,25 +97,33 @@ impl Doors {
         inside.connections.push(Arc::downgrade(connection));
     }
 
-    /// Lets clients in until the doors are closed.
-    pub fn open(self: &Arc<Self>, listener: &UnixListener, shared: &Arc<ServingShared>) {
-        // Given up for a moment when there is no other: so who comes then is told, and does not stand in a queue.
-        let mut spare = File::open("/dev/null").ok();
-        // There before there is none left: an emergency stop needs no thread.
+    /// Begins to answer those who get a kept place and no thread of their own: there is one before there is none left, so that an emergency
+    /// stop needs none.
+    ///
+    /// # Errors
+    /// When the operating system has no thread left.
+    pub fn keep(shared: &Arc<ServingShared>) -> io::Result<SyncSender<Waiting>> {
         let (waiting, waits) = sync_channel::<Waiting>(shared.bounds.kept);
         let served = shared.clone();
-        let _ = std::thread::Builder::new().name("davit-kept".to_owned()).spawn(move || {
+        std::thread::Builder::new().name("davit-kept".to_owned()).spawn(move || {
             for (connection, place) in waits {
                 attend(&connection, &served, true);
                 drop(place);
             }
-        });
+        })?;
+        Ok(waiting)
+    }
+
+    /// Lets clients in until the doors are closed.
+    pub fn open(self: &Arc<Self>, listener: &UnixListener, shared: &Arc<ServingShared>, waiting: &SyncSender<Waiting>) {
+        // Given up for a moment when there is no other: so who comes then is told, and does not stand in a queue.
+        let mut spare = File::open("/dev/null").ok();
         for (number, stream) in (2..).zip(listener.incoming()) {
             if self.is_closed() {
                 return;
             }
             match stream {
-                Ok(stream) => self.admit(number, stream, shared, &waiting),
+                Ok(stream) => self.admit(number, stream, shared, waiting),
                 Err(error) if error.kind() == io::ErrorKind::ConnectionAborted => {}
                 Err(_) => {
                     drop(spare.take());

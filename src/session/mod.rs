@@ -25,6 +25,7 @@ pub mod place;
 mod raising;
 pub mod recording;
 mod recovery;
+mod room;
 mod routes;
 pub mod rpc;
 pub mod service;

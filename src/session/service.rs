@@ -11,7 +11,7 @@ use super::serving::Service;
 use super::{Command, NO_FORWARD, NotFromOutside, NotNamed, NotRaised, Session, Unanswered, recovery};
 use crate::limits;
 use crate::model::finding::did_you_mean;
-use crate::model::{Ask, ConfigId, RequestId};
+use crate::model::{Ask, ConfigId, EventName, RequestId};
 use serde_json::{Value as Json, json};
 use std::sync::Weak;
 use std::time::Duration;
@@ -265,7 +265,7 @@ fn event(session: &Session, params: &Json, gone: ServiceGone<'_>) -> Result<Json
         session.hub().forget(ticket);
         match heard? {
             Some(heard) => answer["heard"] = json!(heard),
-            None => answer["taken"] = json!(false),
+            None => not_taken(session, event, &mut answer),
         }
     } else if waits {
         let Offered { ticket, acted } = session.offer_watched(event, "operator").map_err(not_raised)?;
@@ -286,14 +286,22 @@ fn event(session: &Session, params: &Json, gone: ServiceGone<'_>) -> Result<Json
         session.hub().forget(ticket);
         // What confirms a configuration need not move a coordinator.
         let taken = taken? || session.confirms(event);
-        answer["taken"] = json!(taken);
-        if let Some(note) = (!taken).then(|| session.applied_over_safe(event)).flatten() {
-            answer["note"] = json!(note);
+        match taken {
+            true => answer["taken"] = json!(true),
+            false => not_taken(session, event, &mut answer),
         }
     } else {
         session.offer(event, "operator").map_err(not_raised)?;
     }
     Ok(answer)
+}
+
+/// Nobody has heard it: one of safety tells who thinks that it has stopped something what it does not hold.
+fn not_taken(session: &Session, event: EventName, answer: &mut Json) {
+    answer["taken"] = json!(false);
+    if let Some(note) = session.applied_over_safe(event) {
+        answer["note"] = json!(note);
+    }
 }
 
 fn not_from_outside(why: NotFromOutside) -> RpcError {

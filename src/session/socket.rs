@@ -7,6 +7,7 @@
 use super::doors::Doors;
 use super::owner::Owner;
 use super::place::{self, KnownName};
+use super::room;
 use super::serving::{ServedCalls, ServingShared};
 use super::subscribers::{Subscribers, ToSubscribers};
 use super::tap::LogSink;
@@ -88,13 +89,16 @@ impl ControlSocket {
         fs::set_permissions(&path, fs::Permissions::from_mode(0o600)).map_err(io)?;
         let listening = UnixStream::from(OwnedFd::from(listener.try_clone().map_err(io)?));
         let subscribers = Arc::new(Subscribers::new(bounds.queue));
+        let connections = bounds.connections.min(room::for_connections(bounds.kept));
+        let bounds = Bounds { connections, ..bounds };
         let shared = Arc::new(ServingShared { bounds, subscribers, calls: ServedCalls::default(), service });
         let doors = Arc::new(Doors::default());
+        let kept = Doors::keep(&shared).map_err(io)?;
         let accepting = {
             let (doors, shared) = (doors.clone(), shared.clone());
             std::thread::Builder::new()
                 .name("davit-socket".to_owned())
-                .spawn(move || doors.open(&listener, &shared))
+                .spawn(move || doors.open(&listener, &shared, &kept))
                 .map_err(io)?
         };
         Ok(Self {

@@ -94,15 +94,20 @@ fn on_top(
         by_pieces
     });
     // What that one was to take back of others, and did not, is taken back by this one, unless something it has stopped were started for that.
-    if old.partial {
-        let replacing = whole(system, stack, configuration, request, (at, context))?;
+    if !old.owes.is_empty() {
+        let mut owing = stack.clone();
+        owing.frames[below] = Arc::new(Frame { inverse: Inverse::List(old.owes.clone()), ..(**old).clone() });
+        rest.group = Some(group);
         let wanted = |of: &PlannedStep| straight.planned.steps.iter().any(|planned| planned.step == of.step);
         let up = |of: &&PlannedStep| {
             matches!(of.step, Step::State { transition: Transition::Configure | Transition::Start, .. })
         };
-        if replacing.planned.steps.iter().filter(up).all(wanted) {
-            return Some(replacing);
-        }
+        let back = whole(system, &owing, &rest, request, (at, context));
+        let back = back.filter(|back| back.planned.steps.iter().filter(up).all(wanted));
+        straight = back.map_or(straight, |mut back| {
+            back.planned.parts[0].edits.pops.clear();
+            back
+        });
     }
     straight.frame.group = Some(group);
     let frame = Some(Arc::new(straight.frame.clone()));
@@ -178,11 +183,20 @@ pub(super) fn take_over_group(frames: &mut Vec<Arc<Frame>>, pushed: FrameId, bus
         if let Some(hand) = over(frames, below, at) {
             let old = rest_of(&frames[below], &hand);
             share::hand_over(frames, &hand, &|id| id);
-            frames[at] = Arc::new(taken_over(&old, &frames[at]));
+            let new = Arc::new(taken_over(&old, &frames[at]));
+            frames[at] = if new.partial { Arc::new(owing(&old, &new)) } else { new };
             frames.remove(below);
             at -= 1;
         }
     }
+}
+
+/// The frame of something safe of which not everything was done, with what it may not have taken back of the one whose place it has taken: of one
+/// that is no safe one all, and what a safe one itself owes. What that one has made safe is nothing to be taken back.
+fn owing(old: &Frame, new: &Frame) -> Frame {
+    let mut owes = if old.safe { (*old.owes).clone() } else { list(old) };
+    owes.splice(0..0, new.owes.iter().cloned());
+    Frame { owes: Arc::new(owes), ..new.clone() }
 }
 
 /// What is left of a frame that hands this over.
@@ -278,6 +292,7 @@ fn piecewise(
         left: request.gone,
         partial: !troubles.is_empty(),
         safe: true,
+        owes: Arc::default(),
     };
     let part = Part {
         range: 0..u32::try_from(steps.len()).expect("fewer steps than that"),

@@ -118,6 +118,9 @@ pub struct Frame {
     pub partial: bool,
     /// Its configuration is a `safe` one.
     pub safe: bool,
+    /// Of a safe one that ended *broken*: what takes back the frames whose place it was to take, and may not have been done. Who asks for
+    /// something of its group makes up for it.
+    pub owes: Arc<Vec<DraftStep>>,
 }
 
 impl Frame {

@@ -83,6 +83,7 @@ fn is_alike(a: &Frame, b: &Frame) -> bool {
         && (a.left, a.partial, a.safe, &a.floor) == (b.left, b.partial, b.safe, &b.floor)
         && a.parts == b.parts
         && a.saved == b.saved
+        && a.owes == b.owes
 }
 
 /// Whose frames are squashed, and how far that may go.
@@ -329,5 +330,6 @@ pub(super) fn squash(lower: &Frame, upper: &Frame) -> Frame {
         left: lower.left && upper.left,
         partial: false,
         safe: lower.safe || upper.safe,
+        owes: Arc::default(),
     }
 }

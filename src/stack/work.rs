@@ -396,6 +396,7 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
             left: false,
             partial: false,
             safe: configuration.safe,
+            owes: Arc::default(),
         });
         self.frames.push(frame.clone());
         edits.push = Some(frame);

@@ -11,6 +11,10 @@ use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+/// What [`Clock::spawn`] panics with.
+#[derive(Debug)]
+pub struct NoThread(pub std::io::Error);
+
 /// A clock: real time, or simulated time that moves as fast as the machine and the same way every time.
 ///
 /// Cheap to clone; all clones are the same clock.
@@ -170,9 +174,10 @@ impl Clock {
     /// Runs `f` in a thread of its own, a participant.
     ///
     /// # Panics
-    /// When the operating system has no thread left; see [`Clock::try_spawn`].
+    /// With [`NoThread`] when the operating system has no thread left; see [`Clock::try_spawn`].
     pub fn spawn(&self, name: &str, f: impl FnOnce() + Send + 'static) -> Join {
-        self.try_spawn(name, f).expect("the operating system starts a thread")
+        // Nobody needs to read where in the program that was.
+        self.try_spawn(name, f).unwrap_or_else(|error| resume_unwind(Box::new(NoThread(error))))
     }
 
     /// Runs `f` in a thread of its own, a participant.

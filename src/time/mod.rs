@@ -24,7 +24,7 @@ mod tests;
 pub mod wall;
 
 pub use channel::{Receiver, RecvError, SendError, Sender, TryRecvError, TrySendError};
-pub use clock::{Clock, Guard, Join, JoinError, Released};
+pub use clock::{Clock, Guard, Join, JoinError, NoThread, Released};
 pub use schedule::TaskWait;
 pub use signal::Signal;
 pub use wall::Wall;

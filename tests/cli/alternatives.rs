@@ -211,6 +211,8 @@ fn what_the_first_one_missed_is_made_up_for_and_the_end_takes_all_of_it_back() {
     let clamp = "changes: [{ operation_call: { operation: m.clamp } }], post_conf_state: [\"m:stopped\"]";
     let still = "changes: [{ port_write: { port: m.speed, value: 0.0 } }]";
     let down = "post_conf_state: [\"m:unconfigured\"]";
+    let away = "changes: [{ port_write: { port: m.speed, value: 0.0 } }, { operation_call: { operation: m.clamp } },
+      { disconnect: { from: l.o, to: m.ref } }]";
     let lost = |step: &str| format!("fault('{step}', 'lost', 1)");
     let fails = |step: &str| format!("fault('{step}', 'fail', 1)");
     // What there is, what `stop` and `halt` do, what goes wrong, what comes when, and how it is while it is held, and after the end.
@@ -284,6 +286,37 @@ fn what_the_first_one_missed_is_made_up_for_and_the_end_takes_all_of_it_back() {
             "halt 0.05 stop 2",
             "unconfigured nil 0",
             "running nil 0 0",
+        ),
+        // What another one has made safe is not what a broken one was to take back.
+        (
+            [both, run, slow],
+            "",
+            brake,
+            away,
+            fails("operation_call m.brake"),
+            "halt 1 stop 2 stop 2",
+            "running 0.0 0",
+            "running nil 1 0",
+        ),
+        (
+            [both, run, slow],
+            "",
+            brake,
+            apart,
+            lost("operation_call m.brake"),
+            "halt 1 stop 2 stop 2",
+            "running nil 0",
+            "running nil 1 0",
+        ),
+        (
+            [both, run, slow],
+            "config: slow",
+            brake,
+            away,
+            lost("operation_call m.brake"),
+            "halt 1 stop 2 halt 2 stop 1",
+            "running 0.0 0",
+            "running nil 1 0",
         ),
     ];
     for (base, idle, stop, halt, fault, events, held, end) in table {

@@ -41,6 +41,29 @@ fn idle_connections_do_not_lock_the_operator_out() {
     drop(crowd);
 }
 
+/// Places are no more than there are descriptors for, beside those that are kept.
+#[test]
+fn where_descriptors_are_few_an_emergency_gets_through_all_the_same() {
+    let demo = Demo::new();
+    demo.write("deployment.yaml", &format!("{}safety: [e_fast]\n", demo.read("deployment.yaml")));
+    let program = env!("CARGO_BIN_EXE_davit");
+    let mut command = std::process::Command::new("sh");
+    command.args(["-c", &format!("ulimit -n 32; exec '{program}' deploy deployment.yaml")]);
+    command.current_dir(demo.path("")).env("XDG_RUNTIME_DIR", demo.path("")).env("XDG_STATE_HOME", demo.path("state"));
+    command.stdout(Stdio::null()).stderr(Stdio::null());
+    let deployed = Foreground::start(&mut command);
+    demo.until_phase("up");
+    let come = || UnixStream::connect(demo.path("davit/demo.sock")).expect("they are let in, or told");
+    let crowd: Vec<UnixStream> = (0..limits::SOCKET_CONNECTIONS).map(|_| come()).collect();
+    for _ in 0..2 {
+        let fast = demo.run(&["event", "e_fast", "--wait", "fast.ok", "--within", "60"]);
+        assert_eq!(fast.code, 0, "{}{}", fast.out, fast.err);
+    }
+    assert_eq!(demo.run(&["shutdown"]).code, 0);
+    assert_eq!(deployed.end().code(), Some(0));
+    drop(crowd);
+}
+
 /// One client sends events faster than what they lead to is carried out: they wait, and some are refused, and no request fails for it.
 #[test]
 fn a_burst_of_events_fails_no_request() {

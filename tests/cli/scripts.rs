@@ -143,6 +143,21 @@ fn what_leads_nowhere_is_named_at_its_line() {
     }
 }
 
+/// A table, a text without a place, what has gone on for too long, nothing: the line is where it was raised.
+#[test]
+fn what_is_raised_without_a_place_is_named_at_its_line() {
+    for (text, says) in [
+        ("error({ code = 2 })", "script.lua:2: the error is a table and no text"),
+        ("local function f()\nerror('plain', 0)\nend\nf()", "script.lua:3: plain"),
+        ("error()", "script.lua:2: nil"),
+        ("error(setmetatable({}, { __tostring = function() return 'mine' end }))", "script.lua:2: mine"),
+        ("local a = 1\nwhile true do a = a + 1 end", "script.lua:3: ended after 500 million instructions"),
+    ] {
+        let said = refused(text);
+        assert!(said.contains(says), "{text}: {said}");
+    }
+}
+
 #[test]
 fn a_recording_is_summed_up_and_kept() {
     let demo = Demo::new();

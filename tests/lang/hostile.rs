@@ -73,6 +73,21 @@ fn a_budget_that_ends_in_the_library_is_told_at_the_line_that_called() {
     assert_eq!(place.line, 3);
 }
 
+/// Where an error has no place of its own it is told where it was raised, and not at the beginning of the file.
+#[test]
+fn what_is_raised_without_a_place_has_its_line() {
+    for (text, says) in [
+        ("\n\nerror({})", "the file fails: the error is a table and no text"),
+        ("\n\nerror('plain', 0)", "the file fails: plain"),
+        ("\n\nlocal s = string.rep('x', 1e9)", "the file fails: string.rep would make a text of more than 1 MB"),
+        ("\n\nlocal c = operation_call('A.lock').undo('A.unlock')", "`undo` does not know of what"),
+    ] {
+        let loaded = with_configurations(text);
+        let said = shown(&loaded.findings, &loaded.sources);
+        assert!(said.contains(says) && said.contains(":3:"), "{text}: {said}");
+    }
+}
+
 #[test]
 fn memory_bombs_end() {
     for text in [

@@ -192,7 +192,6 @@ fn every_state_with_torques_hears_every_loss() {
         ".ending.on",
         ".ending.stopped",
         "fault.clearing",
-        "fault_coupled.clearing",
         "fault.repairing",
         // What is asked for now, or as soon as they are released, is that they hold or brake.
         "cancelling.handing_back",

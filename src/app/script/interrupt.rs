@@ -41,6 +41,11 @@ impl Interrupt {
         session.is_some_and(|session| session.waits_to_be_forced())
     }
 
+    /// Whether it has brought something up that would be stopped.
+    pub fn has_deployed(&self) -> bool {
+        lock(&self.state).session.strong_count() > 0
+    }
+
     /// A deployment of the script's: commands go to it from now on, also one that came before.
     pub(super) fn up(&self, session: &Arc<Session>) {
         // Also who asks the deployment to end (`davit shutdown`) ends the script: whatever it catches, and whatever it would do next.

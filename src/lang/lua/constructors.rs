@@ -6,7 +6,7 @@ use crate::lang::grammar::CHANGES;
 use crate::lang::tree::{Entry, Kind, Node};
 use crate::model::finding::{are, count};
 use crate::model::{Code, Finding, Origin, codes};
-use mlua::{Function, LightUserData, Lua, MultiValue, Table, Value};
+use mlua::{Function, Lua, MultiValue, Table, Value};
 use std::borrow::Cow;
 
 /// rFSM's constructors with their other names.
@@ -155,9 +155,18 @@ fn change(
 /// `operation_call(…):undo(operation, …)`
 pub fn undo(lua: &Lua, shared: &SharedRecorder) -> mlua::Result<Function> {
     let recorder = shared.clone();
-    lua.create_function(move |lua, (handle, args): (LightUserData, MultiValue)| {
+    lua.create_function(move |lua, (of, args): (Value, MultiValue)| {
         let line = sandbox::line(lua);
-        let Some(index) = convert::index_of(handle) else { return Ok(Value::LightUserData(handle)) };
+        let Value::LightUserData(handle) = of else {
+            let mut recorder = recorder.borrow_mut();
+            let origin = recorder.call_at(line, "undo");
+            let finding = Finding::error(codes::LUA_ARGUMENTS, "`undo` does not know of what").at(origin);
+            recorder
+                .cx
+                .report(finding.help("it is written with a colon: `operation_call(\"A.lock\"):undo(\"A.unlock\")`"));
+            return Ok(convert::poison());
+        };
+        let Some(index) = convert::index_of(handle) else { return Ok(of) };
         let origin = recorder.borrow_mut().call_at(line, "undo");
         let mut nodes: Vec<Node> = args.iter().map(|v| convert::node(&recorder, v, origin)).collect();
         let mut entries = Vec::with_capacity(2);

@@ -1,5 +1,6 @@
 //! What constructors record while a Lua file runs.
 
+use crate::functions::{place_of, text_of};
 use crate::lang::params::Params;
 use crate::lang::tokens::tokens;
 use crate::lang::tree::{Cx, Kind, Node, Reading};
@@ -205,8 +206,9 @@ impl Recorder {
             self.report_exhausted(&exhausted);
             return;
         }
-        let full = super::sandbox::message_of(error);
+        let full = text_of(error);
         let (line, message) = super::sandbox::split_line(&full);
+        let line = line.or_else(|| Some(place_of(error, super::sandbox::is_file)?.1));
         let at = match line {
             Some(line) => self.cx.sources.exact_line(self.reading.file, line),
             None => self.reading.whole,

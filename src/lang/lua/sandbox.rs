@@ -107,7 +107,7 @@ pub fn line_from(lua: &Lua, level: usize) -> u32 {
     for level in level..level + 5 {
         // Not a line of what is ours.
         let of_file = |debug: &mlua::debug::Debug<'_>| {
-            debug.current_line().filter(|_| debug.source().short_src.is_some_and(|source| source == "davit"))
+            debug.current_line().filter(|_| debug.source().short_src.is_some_and(|source| is_file(&source)))
         };
         if let Some(Some(line)) = lua.inspect_stack(level, of_file) {
             return u32::try_from(line).unwrap_or(u32::MAX);
@@ -197,7 +197,7 @@ fn caught(lua: &Lua, shared: &SharedRecorder, outcome: mlua::Result<MultiValue>)
     match outcome {
         Ok(values) => Ok(std::iter::once(Value::Boolean(true)).chain(values).collect()),
         Err(error) => {
-            let message = message_of(&error);
+            let message = functions::text_of(&error);
             if shared.borrow().exhausted.is_some() || message.contains("not enough memory") {
                 return Err(error);
             }
@@ -452,16 +452,9 @@ fn set_metatable(lua: &Lua, (table, meta): (Table, Option<Table>)) -> mlua::Resu
     Ok(table)
 }
 
-/// The text of an error, without stack traces.
-pub fn message_of(error: &mlua::Error) -> String {
-    let text = match error {
-        mlua::Error::CallbackError { cause, .. } => return message_of(cause),
-        mlua::Error::SyntaxError { message, .. } => message.clone(),
-        mlua::Error::RuntimeError(message) | mlua::Error::MemoryError(message) => message.clone(),
-        other => other.to_string(),
-    };
-    let text = text.split("\nstack traceback:").next().unwrap_or_default();
-    text.strip_prefix("runtime error: ").unwrap_or(text).to_owned()
+/// Whether a text of Lua is one that somebody wrote, and not ours.
+pub fn is_file(source: &str) -> bool {
+    source == "davit"
 }
 
 /// `davit:12: message` → its line and the message.

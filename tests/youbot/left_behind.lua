@@ -1,0 +1,22 @@
+-- A robot comes to `idle` while something of it is left, which it was told to be gone (tests/cli/uncoupled.rs): that it is down is told when somebody has
+-- taken it away, and then the whole coupling goes down by itself.
+
+deploy("../../deployments/youbot_coupling.yaml")
+raise("e_shutdown")
+wait(1)
+fault("operation_call left/youbot.start_calibration", "fail", 1)
+fault("destroy left/youbot", "fail", 1)
+fault("destroy left/Monitors", "lie", 1)
+raise("e_start")
+wait(2)
+raise("e_shutdown")
+wait_state("left:cancel_failed", 10)
+wait(5)
+raise("e_shutdown")
+wait_state("left:idle", 1)
+wait(1)
+wait_state("left_place:released", 0)
+wait_state("pair:lowering", 0)
+recover("back")
+wait_state("left_place:idle", 0.1)
+wait_state("pair:idle", 0.1)
