@@ -1,5 +1,5 @@
 -- Coordinator of one robot of the youBot coupling, with state-scoped configurations: being in `copying` means that
--- enable_copying is in force, and leaving it undoes it. No inverse is written.
+-- enable_copying is in force, and leaving it undoes it. No inverse is written, but for the end of a stop.
 --
 -- It is pure: states, and names of events to raise. It names no component, no port, no platform: what the names mean
 -- here is said by the deployment's configurations, and the same file coordinates another platform over other ones

@@ -26,26 +26,16 @@ impl Engine {
             self.counts.leaving.store(false, Ordering::Release);
             self.leaves(false);
         }
-        self.settle_down();
+        self.look_whether_emptied();
     }
 
-    /// Who is down while something is left is down for good when that is gone: it was mended, or somebody has taken it away.
+    /// Where all are down nothing may be left, also since somebody has put right what was. (What an operator takes away by an undo is looked at when
+    /// they are down once more: `check` follows no other.)
     pub(super) fn look_whether_emptied(&mut self) {
-        if self.left_behind && self.running.is_empty() {
-            self.settle_down();
-        }
-    }
-
-    fn settle_down(&mut self) {
-        self.left_behind = false;
         self.empty_subsystems();
-        if self.all_down() {
-            if self.world.settle_down() {
-                self.confirmations.clear();
-                self.changed();
-            } else {
-                self.left_behind = true;
-            }
+        if self.all_down() && self.world.settle_down() {
+            self.confirmations.clear();
+            self.changed();
         }
     }
 
@@ -57,15 +47,13 @@ impl Engine {
             self.given.subsystems.iter().filter(|(_, all)| down(all)).map(|(path, _)| *path).collect();
         let busy = self.held_frames();
         for path in down {
-            if !self.world.settle_down_in(path, &busy) {
-                self.left_behind = true;
-                continue;
-            }
-            self.counts.leads(path, false);
-            self.forget_confirmations();
-            self.changed();
-            if let Some(progress) = &self.given.progress {
-                progress(&Progress::Emptied(path));
+            if self.world.settle_down_in(path, &busy) {
+                self.counts.leads(path, false);
+                self.forget_confirmations();
+                self.changed();
+                if let Some(progress) = &self.given.progress {
+                    progress(&Progress::Emptied(path));
+                }
             }
         }
     }

@@ -81,9 +81,8 @@ pub(super) struct Engine {
     /// Plans that are carried out again, at most so many of each configuration, the one used last at the end.
     pub switches: FxHashMap<ConfigId, Vec<Fast>>,
     pub confirmations: Confirmations,
-    /// Coordinators that are down, and whether something was left where all that it was of were.
+    /// Coordinators that are down.
     pub down: BTreeSet<Requester>,
-    pub left_behind: bool,
     /// Requests that have begun and were not answered.
     pub current: SmallVec<[(Request, Time); 4]>,
     pub revision: u64,
@@ -130,7 +129,6 @@ impl Engine {
             switches: FxHashMap::default(),
             confirmations: Confirmations::default(),
             down: BTreeSet::new(),
-            left_behind: false,
             current: SmallVec::new(),
             revision: 0,
             snapshot: None,
@@ -177,7 +175,6 @@ impl Engine {
                 }
             }
             did |= self.advance_all();
-            self.look_whether_emptied();
             self.review_standings();
             self.tell_fallen();
             self.look_at_suspects();

@@ -123,6 +123,9 @@ impl Engine {
         if let Some(progress) = &self.given.progress {
             progress(if recovered.is_ok() { &Progress::Recovered } else { &Progress::NotRecovered });
         }
+        if recovered.is_ok() {
+            self.look_whether_emptied();
+        }
         recovered.map(|()| true)
     }
 

@@ -55,10 +55,8 @@ fn where_descriptors_are_few_an_emergency_gets_through_all_the_same() {
     demo.until_phase("up");
     let come = || UnixStream::connect(demo.path("davit/demo.sock")).expect("they are let in, or told");
     let crowd: Vec<UnixStream> = (0..limits::SOCKET_CONNECTIONS).map(|_| come()).collect();
-    for _ in 0..2 {
-        let fast = demo.run(&["event", "e_fast", "--wait", "fast.ok", "--within", "60"]);
-        assert_eq!(fast.code, 0, "{}{}", fast.out, fast.err);
-    }
+    let fast = demo.run(&["event", "e_fast", "--wait", "fast.ok", "--within", "60"]);
+    assert_eq!(fast.code, 0, "{}{}", fast.out, fast.err);
     assert_eq!(demo.run(&["shutdown"]).code, 0);
     assert_eq!(deployed.end().code(), Some(0));
     drop(crowd);
