@@ -126,7 +126,7 @@ impl Sources {
             let same = |name: &&str| language(Path::new(name)).is_some() && language(Path::new(name)) == language(path);
             let alike: Vec<&str> = names.iter().map(String::as_str).filter(same).collect();
             let all = || names.iter().map(String::as_str).collect();
-            did_you_mean(name, "files", if alike.is_empty() { all() } else { alike }.into_iter())
+            did_you_mean(name, "files", if alike.is_empty() { all() } else { alike })
         };
         if !names.is_empty() {
             return near(&names);

@@ -174,7 +174,7 @@ impl Clock {
     /// Runs `f` in a thread of its own, a participant.
     ///
     /// # Panics
-    /// With [`NoThread`] when the operating system has no thread left; see [`Clock::try_spawn`].
+    /// With what that error is when the operating system has no thread left; see [`Clock::try_spawn`].
     pub fn spawn(&self, name: &str, f: impl FnOnce() + Send + 'static) -> Join {
         // Nobody needs to read where in the program that was.
         self.try_spawn(name, f).unwrap_or_else(|error| resume_unwind(Box::new(NoThread(error))))
