@@ -146,15 +146,125 @@ pub mod component {
 /// `examples/own_platform.rs` is a whole program with one, `examples/embed.rs` one that gives its platform to a
 /// [`Configurator`]. A [`Platform`](platforms::Platform) is asked in blocking calls with deadlines, and whether it keeps the
 /// rules that a configurator relies on is tried by a test of a few lines ([`conformance`](platforms::conformance)).
+///
+/// One with nothing behind it but a list of what is there; a real one asks a middleware, and answers *unknown* when it hears nothing
+/// before the deadline:
+///
+/// ```
+/// use davit::platforms::{
+///     Catalogue, Cause, ComponentSnapshot, ComponentType, Direction, EventSink, Execution, ObserveError, Outcome, Platform,
+///     PortType, RunState,
+/// };
+/// use davit::{Clock, ComponentName, Snapshot, Step, Time, ValueType};
+/// use std::sync::Mutex;
+///
+/// struct Shelf {
+///     types: Catalogue,
+///     there: Mutex<Snapshot>,
+/// }
+///
+/// /// Carries one step out, or says why it does not fit what is there.
+/// fn carry_out(step: &Step, types: &Catalogue, there: &mut Snapshot) -> Result<(), &'static str> {
+///     let Snapshot { components, connections, ports } = there;
+///     match step {
+///         Step::Create { component, ty, activity, properties } => {
+///             let declared = types.get(*ty).ok_or("there is no such type")?;
+///             let properties = declared.properties.keys().copied().zip(properties.iter().cloned()).collect();
+///             let made = ComponentSnapshot { ty: *ty, state: RunState::Unconfigured, properties, activity: *activity };
+///             match components.insert(*component, made) {
+///                 None => Ok(()),
+///                 Some(other) => {
+///                     components.insert(*component, other);
+///                     Err("there is one of that name")
+///                 }
+///             }
+///         }
+///         Step::Destroy { component } => components.remove(component).map(drop).ok_or("there is none"),
+///         Step::State { component, transition } => {
+///             let of = components.get_mut(component).ok_or("there is none")?;
+///             if !transition.allowed_in(of.state) {
+///                 return Err("not in its run state");
+///             }
+///             of.state = transition.target();
+///             Ok(())
+///         }
+///         Step::PropertySet { property, value } => {
+///             let of = components.get_mut(&property.component).ok_or("there is none")?;
+///             of.properties.insert(property.member, value.clone()).map(drop).ok_or("it has no such property")
+///         }
+///         Step::Connect { from, to, policy } => match connections.insert((*from, *to), *policy) {
+///             None => Ok(()),
+///             Some(_) => Err("they are connected"),
+///         },
+///         Step::Disconnect { from, to } => connections.remove(&(*from, *to)).map(drop).ok_or("they are not connected"),
+///         Step::PortWrite { port, value: Some(value) } => {
+///             ports.insert(*port, value.clone());
+///             Ok(())
+///         }
+///         Step::PortWrite { port, value: None } => {
+///             ports.remove(port);
+///             Ok(())
+///         }
+///         Step::Operation(_) => Err("it has no operations"),
+///     }
+/// }
+///
+/// impl Platform for Shelf {
+///     fn catalogue(&self) -> &Catalogue {
+///         &self.types
+///     }
+///     fn execution(&self, _: &Step) -> Execution {
+///         Execution::Blocking
+///     }
+///     fn execute(&self, step: &Step, _: Time) -> Outcome {
+///         match carry_out(step, &self.types, &mut self.there.lock().unwrap()) {
+///             Ok(()) => Outcome::Done(None),
+///             Err(why) => Outcome::NotDone(Cause::Refused(why.to_owned())),
+///         }
+///     }
+///     fn cancel(&self, _: &Step) {}
+///     fn observe(&self, _: Time) -> Result<Snapshot, ObserveError> {
+///         Ok(self.there.lock().unwrap().clone())
+///     }
+///     fn observe_component(&self, of: ComponentName, _: Time) -> Result<Option<ComponentSnapshot>, ObserveError> {
+///         Ok(self.there.lock().unwrap().components.get(&of).cloned())
+///     }
+///     fn subscribe(&self, _: EventSink) {}
+///     fn quarantined(&self) -> Vec<ComponentName> {
+///         Vec::new()
+///     }
+/// }
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let mut lamp = ComponentType::new("Lamp", "Lights up.");
+/// lamp.ports.insert("level".parse()?, PortType::new(Direction::In, ValueType::Float));
+/// let mut types = Catalogue::new();
+/// types.insert(lamp);
+/// let shelf = Shelf { types, there: Mutex::default() };
+///
+/// let clock = Clock::simulated();
+/// let (soon, lamp) = (clock.now(), "lamp".parse()?);
+/// let made = Step::Create { component: lamp, ty: "Lamp".parse()?, activity: None, properties: Vec::new() };
+/// assert_eq!(shelf.execute(&made, soon), Outcome::Done(None));
+/// assert!(matches!(shelf.execute(&made, soon), Outcome::NotDone(Cause::Refused(_))));
+/// assert_eq!(shelf.observe(soon)?.components[&lamp].state, RunState::Unconfigured);
+/// # clock.shutdown();
+/// # Ok(())
+/// # }
+/// ```
 pub mod platforms {
     pub use crate::app::{Making, PlatformMaker};
+    pub use crate::model::monitor::{Counter, PortSignal};
     pub use crate::model::{
-        Call, Catalogue, Cause, ComponentSnapshot, ComponentType, Execution, Injection, MemberRef, Outcome,
-        PlatformKind, PropertyType, Tunable,
+        ActivityStatus, Call, Catalogue, Cause, ComponentSnapshot, ComponentType, Direction, Effect, Execution,
+        Injection, InjectionParameter, InjectionType, Irreversible, MemberRef, Moves, OperationType, Outcome,
+        PlatformKind, Policy, PortType, PropertyType, Resource, RunState, Transition, Tunable, TypeName,
     };
+    pub use crate::monitor::{InputSample, MonitorInput};
     pub use crate::platform::conformance;
     pub use crate::platform::simulated::{Simulated, SimulatedOptions};
     pub use crate::platform::{
-        EventSink, ObserveError, Platform, PlatformEvent, Prepared, StepBatch, TimedOutcome, TimedStep,
+        EventSink, ObserveError, Platform, PlatformEvent, Prepared, StepBatch, TimedOutcome, TimedStep, Watch,
     };
+    pub use crate::time::Signal;
 }

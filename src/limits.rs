@@ -5,6 +5,7 @@ mod check;
 mod kept;
 mod script;
 mod sweep;
+mod texts;
 
 pub use asking::*;
 pub use check::*;
@@ -12,6 +13,7 @@ pub use kept::*;
 pub use script::*;
 use std::time::Duration;
 pub use sweep::*;
+pub use texts::*;
 
 /// Frames on a stack before the oldest are squashed into one. Enough for every switch of a session to be undone singly,
 /// small enough that selective undo, which looks at the frames above, stays instant.
@@ -219,34 +221,6 @@ pub const MOMENT_PAUSE: Duration = Duration::from_millis(1);
 
 /// Findings shown on a terminal in one go; more are counted, since nobody reads on.
 pub const FINDINGS_SHOWN: usize = 50;
-
-/// Bytes of one text file. A generated deployment of 100,000 components takes about 10 MB; a file past this is refused
-/// by its size, before it is read.
-pub const FILE_BYTES: u64 = 16 * 1024 * 1024;
-
-/// Levels of nesting of a text: values and statecharts written by people stay below ten.
-pub const TEXT_DEPTH: usize = 64;
-
-/// Nodes of a text after its aliases are expanded: bounds what a few lines of aliases can unfold to.
-pub const TEXT_NODES: usize = 1_000_000;
-
-/// Bytes of text that are looked through for globals that nobody has set, counted once for each such name: a model that asks for
-/// many in a large text is not searched for ever.
-pub const SLIP_BYTES: usize = 64 * 1024 * 1024;
-
-/// Bytes of large elements ([`PLACE_LARGE`]) in which the words are looked for that findings are about; past it a finding points at the
-/// element around them. Some seconds, for files that mean harm.
-pub const PLACE_BYTES: usize = 32 * 1024 * 1024;
-
-/// Bytes of an element that is large: one that people write has some hundreds.
-pub const PLACE_LARGE: usize = 64 * 1024;
-
-/// Names that one event of a foreign SCXML document is taken to mean beside itself (those that begin with it); past it a warning
-/// says that they are not all.
-pub const SCXML_NAMES: usize = 100;
-
-/// Findings collected from the texts of one deployment; past it reading stops, since the rest follows from the first.
-pub const FINDINGS: usize = 1_000;
 
 /// Instructions of the Lua machine one file may take. A written configuration takes a few; a generated deployment of
 /// 100,000 components some millions.

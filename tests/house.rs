@@ -438,6 +438,9 @@ fn nothing_is_left_undone_and_no_machine_is_named() {
     assert!(wrong.is_empty(), "unfinished code, or paths that exist on one machine only:\n{}", wrong.join("\n"));
 }
 
+/// Texts whose sections are numbered.
+const NUMBERED: [&str; 2] = ["docs/rfsm.md", "manual of Lua"];
+
 /// What the code refers to for its meaning is in the repository: a section of `docs/semantics.md`, or another page of `docs`.
 #[test]
 fn what_is_referred_to_is_there() {
@@ -448,7 +451,9 @@ fn what_is_referred_to_is_there() {
         if file.ends_with("house.rs") {
             continue;
         }
-        assert!(!text.contains("design \u{a7}"), "{file} refers to a text that is not here");
+        let elsewhere =
+            text.lines().find(|line| line.contains('\u{a7}') && !NUMBERED.iter().any(|text| line.contains(text)));
+        assert!(elsewhere.is_none(), "{file} refers to a text that is not here: {elsewhere:?}");
         for (at, _) in text.match_indices("(semantics:") {
             let inside =
                 &text[at..at + text[at..].find(')').unwrap_or_else(|| panic!("{file}: a parenthesis is open"))];

@@ -160,6 +160,11 @@ impl Product<'_> {
     /// Nothing is known: each request may end in any way, one after the other.
     fn ends_somehow(&mut self, state: &ProductState, number: u32, top: Top, requests: &[Request], nexts: &mut Nexts) {
         let ask = requests[0].ask;
+        // It may have begun together with those before it, and may not.
+        if requests[0].is_overtaken().is_some() {
+            let went = Went::to(state.world);
+            self.ended(state, number, &self.first_ends(&went, Some(Verdict::Cancelled)), nexts);
+        }
         for verdict in [ask.done(), ask.failed(), ask.broken()] {
             let went = Went::to(self.worlds.answered(top, &requests[0], verdict));
             self.ended(state, number, &self.first_ends(&went, Some(verdict)), nexts);

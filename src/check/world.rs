@@ -12,7 +12,7 @@ use super::kept::KeptValues;
 use super::outcome::{Comes, ConcurrentWork, EndsSo, Held, InterruptedSo, SafeComes, Went, Whose, WorldId};
 use super::shape::{Shapes, StackShape, Undone};
 use super::systems::{SystemId, Systems};
-use crate::model::{Ask, Catalogue, ConfigId, Configuration, Deployment, RequestId};
+use crate::model::{Ask, Catalogue, ConfigId, Configuration, Deployment, RequestId, Step};
 use crate::plan::{PlanContext, Refusal, plan};
 use crate::stack::claims::Claims;
 use crate::stack::{
@@ -235,7 +235,11 @@ impl<'a> Worlds<'a> {
         let mut world = before.clone();
         let system = self.systems.carry_out(self.system(id), &mut world.system, &planned.steps);
         let edits = planned.parts[0].edits.clone();
-        let how = SafeEnd { left_out: !troubles.is_empty(), ..SafeEnd::default() };
+        let done: Vec<Step> = match edits.over.is_empty() {
+            true => Vec::new(),
+            false => planned.steps.iter().map(|planned| planned.step.clone()).collect(),
+        };
+        let how = SafeEnd { left_out: !troubles.is_empty(), done: &done, ..SafeEnd::default() };
         let (pushed, verdict) = world.settle_safe(edits, frame, &how, held);
         let may_fail = !planned.steps.is_empty();
         let troubles = Rc::new(troubles.iter().flat_map(Reason::findings).collect());

@@ -170,10 +170,13 @@ fn unknown(what: &str) -> CommandFailure {
             "`davit explain` lists all codes, `davit explain --keys` all keys",
         ),
     };
-    let near = match called(name).first() {
-        Some(code) => Some(*code),
-        None => nearest(name, PAGES.iter().map(|page| page.code.0).chain(schema::names())),
-    };
+    let inside =
+        name.rsplit_once('.').and_then(|(of, key)| Some(format!("{of}.{}", nearest(key, schema::keys_of(of))?)));
+    let near = called(name)
+        .first()
+        .map(|code| (*code).to_owned())
+        .or(inside)
+        .or_else(|| nearest(name, PAGES.iter().map(|page| page.code.0).chain(schema::names())).map(str::to_owned));
     let help = near.map_or_else(|| list.to_owned(), |near| and_also(&format!("did you mean `{near}`?"), list));
     CommandFailure::no(CLI_UNKNOWN_CODE, message, help)
 }

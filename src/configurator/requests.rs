@@ -312,7 +312,8 @@ impl Engine {
 
     /// What is left of a request that ended *broken*: its partial frame, and what is not known.
     pub(super) fn left_broken(&mut self, request: &Request, broken: BrokenPart, since: FrameId) {
-        let BrokenPart { residual, frame, instead, expected, guests, gone, also } = broken;
+        let BrokenPart { residual, frame, instead, mut expected, guests, gone, also } = broken;
+        self.leave_out_coming(&mut expected);
         // What was to be undone with it has each its own.
         self.world.stack.apply([&gone], &[]);
         for frame in also {

@@ -7,7 +7,7 @@ use super::engine::Engine;
 use super::request::{Reason, Request};
 use super::running::{Purpose, Running};
 use super::safety::{Troubled, coming};
-use crate::model::{Ask, ConfigId, RequestId, Step, Target, Verdict};
+use crate::model::{Ask, ConfigId, RequestId, Snapshot, Step, Target, Verdict};
 use crate::stack::{BestEffort, Frame, Planned, Residual, SafeEnd, Stack, components, effort};
 use crate::system::touch::{Slot, slot};
 use crate::system::{System, step, touch};
@@ -47,7 +47,8 @@ impl Engine {
         // What earlier safe ones will have done counts as done; but what both write only this one does.
         let was = self.earlier_safe(&request);
         let (mut earlier, comes_after) = (was.steps(), was.numbers.clone());
-        let stack = self.stack_with_earlier();
+        let mut stack = self.stack_with_earlier();
+        let begun = self.begun_to_be_taken_back(&mut stack);
         let plan = |system: &System, earlier: &[Step]| {
             effort(&with(system, earlier), &stack, configuration, &request, at, &self.given.context)
         };
@@ -86,7 +87,12 @@ impl Engine {
                 touched.add_state(component, entry.state);
             }
         }
-        taken_back(&planned).for_each(|frame| touched.takes_place_of(frame));
+        for rest in taken_back(&planned) {
+            let whole = begun.iter().find(|whole| whole.id == rest.id);
+            touched.takes_place_of(whole.unwrap_or(rest));
+            // What was being taken back stays so: the way back of who was doing that leaves it.
+            whole.into_iter().for_each(|_| self.world.stack.replace((**rest).clone()));
+        }
         touched.leaves(&frame);
         touched.planned_at(self.world.system.revision());
         self.safety.troubles.push(Troubled { request: request.id, reasons: troubles, missed: Vec::new() });
@@ -112,10 +118,11 @@ impl Engine {
                 let anew =
                     matches!((request.ask, safe.0.ask), (Ask::Apply(one), Ask::Apply(other)) if replaces(one, other));
                 for open in other.machine.still_to_do() {
-                    let unknown = anew && open.begun && brings_about(&safe.1, &open.step);
-                    match unknown {
+                    // What it only takes back of others is so for whoever comes, whoever does it.
+                    let own = anew && brings_about(&safe.1, &open.step);
+                    match own && open.begun {
                         true => earlier.unknown.push(open.step),
-                        false => earlier.counted.push((open.step, anew)),
+                        false => earlier.counted.push((open.step, own)),
                     }
                 }
                 earlier.numbers.push(other.number);
@@ -163,6 +170,15 @@ impl Engine {
         stack
     }
 
+    /// What has ended *broken* is not expected with what safe configurations have done that are still being applied: their frames come.
+    pub(super) fn leave_out_coming(&self, expected: &mut Snapshot) {
+        for other in &self.running {
+            if let Purpose::Safe(safe) = &other.purpose {
+                safe.1.leaves_out(&other.machine.done_steps().collect::<Vec<_>>(), expected);
+            }
+        }
+    }
+
     /// The steps of safe configurations that came before which are not over.
     pub(super) fn busy_before(&self, running: &Running) -> Vec<OpenStep> {
         if running.after.is_empty() {
@@ -170,6 +186,22 @@ impl Engine {
         }
         let before = self.running.iter().filter(|other| running.after.contains(&other.number));
         before.flat_map(|other| other.machine.still_to_do()).collect()
+    }
+
+    /// Frames that what is interrupted had begun to take back: in the stack they have what is left of that to be done. What they were.
+    fn begun_to_be_taken_back(&self, stack: &mut Stack) -> Vec<Arc<Frame>> {
+        let mut begun = Vec::new();
+        for running in self.running.iter().filter(|running| running.is_interrupted()) {
+            let mut done: Vec<&Step> = running.machine.done_so_far().map(|(planned, _)| &planned.step).collect();
+            for popped in running.machine.planned().popped.iter().filter(|popped| !popped.safe) {
+                let Some(whole) = stack.frame(popped.id).cloned() else { continue };
+                if let Some(rest) = whole.but_for(&mut done) {
+                    stack.replace(rest);
+                    begun.push(whole);
+                }
+            }
+        }
+        begun
     }
 
     /// Whether a safe configuration interrupts what is under way here: what claims something of its (sub)system, and whatever
@@ -197,7 +229,11 @@ impl Engine {
         let mut touched = self.safety.touched.clone();
         for other in self.running.iter().rev().filter(|other| other.is_safe()) {
             if let Purpose::Safe(safe) = &other.purpose {
-                touched.join(safe.2.clone());
+                // What it has not written yet, for all that is known, is there as what is interrupted has left it.
+                let (mut theirs, open): (_, Vec<OpenStep>) = (safe.2.clone(), other.machine.still_to_do().collect());
+                other.machine.note_done(&mut theirs);
+                theirs.missed(open.iter().map(|open| &open.step));
+                touched.join(theirs);
             }
         }
         let mut before: Option<System> = None;
@@ -229,6 +265,7 @@ impl Engine {
         // Also if it comes no further: what was interrupted heeds it. Calls are kept by its frame alone.
         self.safety.touched.join(touched.without_calls());
         let mut missed: Vec<Step> = machine.missed().cloned().collect();
+        let done: Vec<Step> = machine.done_steps().cloned().collect();
         let edits = self.safety.settled(machine.planned().parts[0].edits.clone());
         let end = machine.end();
         let (mut troubles, missed_before) = self.safety.troubles_of(request.id);
@@ -241,7 +278,8 @@ impl Engine {
         let interrupted = !self.world.broken.is_empty() || self.running.iter().any(Running::is_interrupted);
         let held = self.held_frames();
         let failed = broken.as_ref().map(|part| part.frame.as_ref());
-        let how = SafeEnd { failed, missed: &missed, left_out: !troubles.is_empty(), interrupts: interrupted };
+        let left_out = !troubles.is_empty();
+        let how = SafeEnd { failed, missed: &missed, left_out, done: &done, interrupts: interrupted };
         let (pushed, verdict) = self.world.settle_safe(edits, frame, &how, &held);
         if broken.is_none() {
             self.safety.pushed.push((number, pushed));
@@ -332,7 +370,7 @@ impl Engine {
 /// What safe configurations that are being applied have still to do about the same things.
 #[derive(Default)]
 struct Earlier {
-    /// Counts as done; and whether it is of one whose place is taken.
+    /// Counts as done; and whether it is what one wants whose place is taken, and not what that takes back of others.
     counted: Vec<(Step, bool)>,
     /// Values, run states and connections that are out, of one whose place is taken: nobody knows yet whether they come to be, and they are done once more. What
     /// that one itself takes the place of is taken back by it all the same.

@@ -1,5 +1,6 @@
 //! Where texts come from: the disk, or memory.
 
+use super::pipe::Pipe;
 use crate::diagnostics::Language;
 use crate::limits;
 use crate::model::finding::did_you_mean;
@@ -75,7 +76,10 @@ impl Sources {
                 if meta.len() > limits::FILE_BYTES {
                     return Err(too_large());
                 }
-                let file = File::open(path).map_err(cannot)?;
+                let file: Box<dyn Read> = match meta.file_type().is_file() {
+                    true => Box::new(File::open(path).map_err(cannot)?),
+                    false => Box::new(Pipe::open(path, limits::PIPE_WAIT).map_err(cannot)?),
+                };
                 let mut bytes = Vec::with_capacity(usize::try_from(meta.len()).unwrap_or(0) + 1);
                 // Pipes and growing files have no honest length: stop one byte past the limit.
                 file.take(limits::FILE_BYTES + 1).read_to_end(&mut bytes).map_err(cannot)?;

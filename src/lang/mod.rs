@@ -17,6 +17,7 @@ mod load;
 mod lower;
 mod lua;
 mod params;
+mod pipe;
 pub mod print;
 pub mod schema;
 mod scxml;

@@ -327,7 +327,8 @@ impl Fields {
             let inside = table && object.what == "a state";
             // `{ value: 1,0 }` and `{ events: a, b }`: a `,` ends the value before it.
             let cut_off = matches!(entry.value.kind, Kind::Null) && !cx.is_lua(entry.origin);
-            let help = match nearest(&entry.key, object.names()) {
+            let names = || object.names_in(cx.is_lua(entry.origin));
+            let help = match nearest(&entry.key, names()) {
                 None if cut_off && entry.key.bytes().all(|b| b.is_ascii_digit()) => {
                     "is it of the number before it? Write that with a point, like `0.5`".to_owned()
                 }
@@ -336,7 +337,7 @@ impl Fields {
                 None if inside && cx.is_lua(entry.origin) => {
                     format!("a state inside is made by `state`: `{} = state {{ … }}`", entry.key)
                 }
-                _ => did_you_mean(&entry.key, "keys", object.names()),
+                _ => did_you_mean(&entry.key, "keys", names()),
             };
             cx.report(
                 Finding::error(codes::TEXT_UNKNOWN_KEY, format!("{} has no `{}`", object.what, entry.key))

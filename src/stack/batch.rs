@@ -306,6 +306,10 @@ fn resolve<'a>(
     match request.ask {
         Ask::Apply(id) => {
             let Some(configuration) = rules.configurations.get(&id) else { return tell(failed, Reason::Unknown(id)) };
+            // Like what waits it does not begin any more.
+            if let Some(by) = request.is_overtaken() {
+                return tell(Verdict::Cancelled, Reason::SafeCame(by));
+            }
             if !may_apply(request, configuration, rules.operator) {
                 return tell(failed, Reason::NotListed(id));
             }

@@ -158,7 +158,7 @@ impl Desk {
             kept.requests.retain(|request| !replaced(request));
             // What is behind in a batch under way was asked for before as well.
             let behind = self.under_way.iter_mut().flat_map(|active| &mut active.batch.requests);
-            behind.filter(|r| concerns(id, r)).for_each(|request| request.still.come(Stillness::Overtaken));
+            behind.filter(|r| concerns(id, r)).for_each(|request| request.still.come(Stillness::Overtaken(id)));
             kept.requests.iter_mut().for_each(|request| request.still.come(Stillness::WithSafe));
             for request in self.cancel_waiting(|request| concerns(id, request)) {
                 let verdict = if request.ask.is_undo() { Verdict::UndoFailed } else { Verdict::Cancelled };

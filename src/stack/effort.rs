@@ -10,10 +10,10 @@ use super::void::rest;
 use super::work::{Op, Part, Planned, transaction};
 use super::{Edits, Frame, FrameId, Inverse, Reason, Request, Stack};
 use crate::model::{
-    Change, ChangeKind, ComponentName, Configuration, StateEntry, StateList, Step, Target, Transition, codes,
+    Change, ChangeKind, ComponentName, Configuration, RunState, StateEntry, StateList, Step, Target, Transition, codes,
 };
 use crate::plan::footprint::{Footprint, Slot};
-use crate::plan::undo::{DraftStep, items};
+use crate::plan::undo::{DraftStep, absolute, items};
 use crate::plan::{PlanContext, PlannedStep, plan_on};
 use crate::system::{Overlay, System, View};
 use crate::time::Time;
@@ -169,13 +169,15 @@ fn of_what_is_there<'c>(system: &System, configuration: &'c Configuration) -> Co
 
 /// The frame of a safe configuration of a group takes the others of that group over that are still there: it did not find them yet when it
 /// was planned (an emergency comes again while the first is being applied), or could not be planned whole. Its undo leads to where theirs
-/// would have led.
-pub(super) fn take_over_group(frames: &mut Vec<Arc<Frame>>, pushed: FrameId, busy: &[FrameId]) {
+/// would have led. What is left of something ordinary that is broken, and that it
+/// was not to take the place of (`apart`), is its own matter: who repairs that undoes it by its name.
+pub(super) fn take_over_group(frames: &mut Vec<Arc<Frame>>, pushed: FrameId, busy: &[FrameId], apart: &[FrameId]) {
     let Some(mut at) = frames.iter().position(|frame| frame.id == pushed) else { return };
     let Some(group) = frames[at].group else { return };
     for below in (0..at).rev() {
         let (old, new) = (&frames[below], &frames[at]);
-        let free = !busy.contains(&old.id) && old.foreign_to(new.requester).is_none();
+        let own_matter = !old.safe && apart.contains(&old.id);
+        let free = !busy.contains(&old.id) && !own_matter && old.foreign_to(new.requester).is_none();
         if old.group != Some(group) || !free {
             continue;
         }
@@ -184,19 +186,46 @@ pub(super) fn take_over_group(frames: &mut Vec<Arc<Frame>>, pushed: FrameId, bus
             let old = rest_of(&frames[below], &hand);
             share::hand_over(frames, &hand, &|id| id);
             let new = Arc::new(taken_over(&old, &frames[at]));
-            frames[at] = if new.partial { Arc::new(owing(&old, &new)) } else { new };
+            frames[at] = if new.partial { Arc::new(owing(&old, &frames[at], &new)) } else { new };
             frames.remove(below);
             at -= 1;
         }
     }
 }
 
-/// The frame of something safe of which not everything was done, with what it may not have taken back of the one whose place it has taken: of one
-/// that is no safe one all, and what a safe one itself owes. What that one has made safe is nothing to be taken back.
-fn owing(old: &Frame, new: &Frame) -> Frame {
+/// The frame of something safe of which not everything was done (`new`; before it had taken over `old`: `made`), with what it may not have taken back
+/// of the one whose place it has taken: of one that is no safe one all, and what a safe one itself owes. What something safe has written, or called as
+/// well, is nothing to be taken back.
+fn owing(old: &Frame, made: &Frame, new: &Frame) -> Frame {
     let mut owes = if old.safe { (*old.owes).clone() } else { list(old) };
-    owes.splice(0..0, new.owes.iter().cloned());
+    let own = list(made);
+    let is_made_safe = |item: &DraftStep| match (&item.step, absolute(&item.step)) {
+        (_, Some(slot)) => made.saved.iter().any(|saved| saved.slot == slot),
+        (Step::Operation(_), _) => own.iter().any(|of| of.step == item.step),
+        _ => false,
+    };
+    owes.retain(|item| !is_made_safe(item));
+    owes.splice(0..0, made.owes.iter().cloned());
     Frame { owes: Arc::new(owes), ..new.clone() }
+}
+
+impl Frame {
+    /// What takes it back, step by step.
+    pub(crate) fn taking_back(&self) -> Vec<DraftStep> {
+        list(self)
+    }
+
+    /// What is left of it where these steps of its taking back are done, each of which is used up; but for values, which are written or not. None: nothing
+    /// of it is.
+    pub(crate) fn but_for(&self, done: &mut Vec<&Step>) -> Option<Self> {
+        let mut left = self.taking_back();
+        let length = left.len();
+        left.retain(|item| {
+            let at = done.iter().position(|step| absolute(step).is_none() && **step == item.step);
+            at.map(|at| done.remove(at)).is_none()
+        });
+        (left.len() < length).then(|| Self { inverse: Inverse::List(Arc::new(left)), ..self.clone() })
+    }
 }
 
 /// What is left of a frame that hands this over.
@@ -223,22 +252,117 @@ fn taken_over(old: &Frame, new: &Frame) -> Frame {
         let (inverse, footprint) = (old.inverse.clone(), old.footprint.clone());
         return Frame { inverse, footprint, saved: old.saved.clone(), floor: old.floor.clone(), ..new.clone() };
     }
-    let mut states: FxHashMap<ComponentName, Transition> = FxHashMap::default();
-    let mut leads = |item: &DraftStep| match item.step {
-        Step::State { component, transition } => states.insert(component, transition) != Some(transition),
+    // Where the newer one's list has brought a component there, the older one's goes on from that.
+    let mut states: FxHashMap<ComponentName, RunState> = FxHashMap::default();
+    for item in &own {
+        if let Step::State { component, transition } = item.step {
+            states.insert(component, transition.target());
+        }
+    }
+    theirs.retain(|item| match &item.step {
+        Step::State { component, transition } => match states.get_mut(component) {
+            Some(state) if !transition.allowed_in(*state) => false,
+            Some(state) => {
+                *state = transition.target();
+                true
+            }
+            None => true,
+        },
+        Step::Create { component, .. } => {
+            states.remove(component);
+            true
+        }
         _ => true,
-    };
-    own.iter().for_each(|item| _ = leads(item));
-    theirs.retain(leads);
+    });
     let [old, new] = [(old, theirs), (new, own)]
         .map(|(frame, items)| Frame { inverse: Inverse::List(Arc::new(items)), ..frame.clone() });
     let (group, scope, left, partial) = (new.group, new.scope, new.left, new.partial);
     Frame { group, scope, left, partial, parts: Arc::default(), ..squash(&old, &new) }
 }
 
+/// What has been done of taking `others` back: these steps of something safe, as planned (`own`) and with the `frame` of what was done, are owed
+/// no more; answers those that something safe had owed. Nobody does them once more, and its end does not take them back: it leads to where the others
+/// are not in force.
+pub(super) fn owed_no_more(
+    stack: &mut Stack,
+    others: &[FrameId],
+    own: &Frame,
+    frame: Frame,
+    done: &[Step],
+) -> (Frame, Vec<Step>) {
+    let (mut left, mut kept, mut made_up) = (done.iter().collect::<Vec<&Step>>(), list(&frame), Vec::new());
+    // What it does itself is its own, and its calls are taken back by itself.
+    for planned in own.steps() {
+        let at = left.iter().position(|step| **step == planned.step);
+        at.into_iter().for_each(|at| _ = left.remove(at));
+    }
+    let own = list(own);
+    let before = kept.clone();
+    let is_missing = |item: &&DraftStep| {
+        let called = done.iter().any(|step| takes_back(item, step));
+        called && !kept.iter().any(|of| of.step == item.step)
+    };
+    let missing: Vec<DraftStep> = own.iter().filter(is_missing).cloned().collect();
+    kept.splice(0..0, missing);
+    for other in others.iter().filter_map(|id| stack.frame(*id).cloned()).collect::<Vec<_>>() {
+        let (mut rest, mut owes) = (list(&other), (*other.owes).clone());
+        let done: Vec<DraftStep> = {
+            let mut was_done = |item: &&DraftStep| {
+                let counts = other.safe || item.takes_back_call().is_some();
+                let at = left.iter().position(|step| counts && **step == item.step);
+                at.map(|at| left.remove(at)).is_some()
+            };
+            if other.safe { &owes } else { &rest }.iter().filter(&mut was_done).cloned().collect()
+        };
+        if done.is_empty() {
+            continue;
+        }
+        // What comes first of these was done last: what is owed lies below what the one that owes it has done.
+        let drop_last = |list: &mut Vec<DraftStep>, is: &dyn Fn(&DraftStep) -> bool| {
+            list.iter().rposition(is).into_iter().for_each(|at| _ = list.remove(at));
+        };
+        for item in &done {
+            drop_last(&mut rest, &|of| of.step == item.step);
+            drop_last(&mut owes, &|of| of.step == item.step);
+            let back = |of: &DraftStep| undoes(of, &item.step);
+            if kept.iter().filter(|of| back(of)).count() > own.iter().filter(|of| back(of)).count() {
+                drop_last(&mut kept, &back);
+            }
+        }
+        if other.safe {
+            made_up.extend(done.into_iter().map(|item| item.step));
+        }
+        stack.replace(Frame { inverse: Inverse::List(Arc::new(rest)), owes: Arc::new(owes), ..(*other).clone() });
+    }
+    (if kept == before { frame } else { Frame { inverse: Inverse::List(Arc::new(kept)), ..frame } }, made_up)
+}
+
+/// Whether an item leads back from a step.
+fn undoes(item: &DraftStep, step: &Step) -> bool {
+    match (step, &item.step) {
+        (Step::State { component, transition }, back) => {
+            *back == Step::State { component: *component, transition: transition.inverse() }
+        }
+        (Step::Connect { from, to, .. }, Step::Disconnect { from: a, to: b })
+        | (Step::Disconnect { from, to }, Step::Connect { from: a, to: b, .. }) => (from, to) == (a, b),
+        (Step::Create { component, .. }, Step::Destroy { component: of })
+        | (Step::Destroy { component }, Step::Create { component: of, .. }) => component == of,
+        (Step::Operation(_), _) => takes_back(item, step),
+        (step, back) => absolute(step).is_some() && absolute(step) == absolute(back),
+    }
+}
+
+/// Whether an item is the undo of this call.
+fn takes_back(item: &DraftStep, step: &Step) -> bool {
+    matches!((item.takes_back_call(), step), (Some(call), Step::Operation(of)) if of == call)
+}
+
 /// The frame of a safe configuration of which these steps were not done: it takes back what was.
 pub fn without(frame: Frame, missed: &[Step]) -> Frame {
-    let (done, saved) = rest(&frame, &|planned| !missed.contains(&planned.step));
+    let (done, mut saved) = rest(&frame, &|planned| !missed.contains(&planned.step));
+    // What it found written by an earlier one, as it was planned, was not: there is nothing that it would give back.
+    let written = |slot: Slot| done.iter().any(|planned| absolute(&planned.step) == Some(slot));
+    saved.retain(|saved| written(saved.slot) || missed.iter().all(|step| absolute(step) != Some(saved.slot)));
     Frame { inverse: Inverse::List(Arc::new(items(&done, &saved))), saved, partial: true, ..frame }
 }
 

@@ -64,23 +64,8 @@ impl World {
     /// Something is broken from now on. What the model has of it may have been written by safe configurations in force: what is
     /// expected is without that, since their undo is to lead there.
     pub fn breaks(&mut self, mut broken: Broken) {
-        let written = self.overwritten(&broken).map(|(_, saved)| (saved.slot, saved.value.clone()));
-        for (slot, value) in written.collect::<Vec<_>>() {
-            match (slot, value) {
-                (Slot::Property(property), Saved::Property(value)) => {
-                    let one = broken.expected.components.get_mut(&property.component);
-                    let there = one.and_then(|one| one.properties.get_mut(&property.member));
-                    there.into_iter().for_each(|there| *there = value.clone());
-                }
-                (Slot::Port(port), Saved::Port(Some(value)))
-                    if broken.expected.components.contains_key(&port.component) =>
-                {
-                    broken.expected.ports.insert(port, value);
-                }
-                (Slot::Port(port), Saved::Port(None)) => drop(broken.expected.ports.remove(&port)),
-                _ => {}
-            }
-        }
+        let written = self.overwritten(&broken).map(|(_, saved)| saved.clone());
+        written.collect::<Vec<_>>().iter().for_each(|saved| put_back(saved, &mut broken.expected));
         for (name, one) in &mut broken.expected.components {
             if let Some((before, _)) = self.moved_by_safe(*name).filter(|(_, after)| *after == one.state) {
                 one.state = before;
@@ -200,13 +185,40 @@ impl World {
         }
     }
 
-    /// What it takes back of theirs is no more than what is there of something broken: there would be no undo of it.
+    /// What was seen to be otherwise than one had left it whose place has been `taken` is the matter of the one that has taken it, `pushed`, which
+    /// has written `own`: the undo of that leads to where the other one's would have led.
+    pub(super) fn answers_for(
+        &mut self,
+        before: &[Arc<Frame>],
+        taken: impl Fn(&Frame) -> bool,
+        pushed: FrameId,
+        own: &[SavedValue],
+    ) {
+        for at in 0..self.broken.len() {
+            let broken = &self.broken[at];
+            let Some(culprit) = broken.culprit.filter(|_| broken.frame.is_none()) else { continue };
+            let is_its =
+                |frame: &Arc<Frame>| frame.safe && (frame.configuration, frame.requester) == culprit && taken(frame);
+            if before.iter().any(is_its) && self.is_nobodys(broken) {
+                let broken = &mut self.broken[at];
+                broken.frame = Some(pushed);
+                // What that one had left is there by this one's word from now on, but for what this one has written over it.
+                if let Some(seen) = &mut broken.seen {
+                    seen.newest = seen.newest.max(pushed);
+                    seen.written.retain(|(slot, _)| own.iter().all(|saved| saved.slot != *slot));
+                }
+            }
+        }
+    }
+
+    /// What it takes back of theirs is no more than what is there of something broken, unless that is its own matter: there would be no undo of it.
     pub(super) fn takes_back_what_is_there(&mut self, pushed: FrameId) {
         let Some(frame) = self.stack.frame(pushed) else { return };
         let Inverse::List(items) = &frame.inverse else { return };
         let mut left = self.system.clone();
         let mut is_there = |item: &&DraftStep| {
-            goes_on(&item.step, &mut left) || self.broken_at(touch::components(&item.step).into_iter()).is_none()
+            let broken = self.broken_at(touch::components(&item.step).into_iter());
+            goes_on(&item.step, &mut left) || broken.is_none_or(|broken| broken.frame == Some(pushed))
         };
         let kept: Vec<DraftStep> = items.iter().filter(|item| is_there(item)).cloned().collect();
         if kept.len() < items.len() {
@@ -401,6 +413,42 @@ impl World {
             step::apply(&planned.step, &mut reached).ok()?;
         }
         diff(&reached, end).is_empty().then_some(steps)
+    }
+}
+
+/// Puts into what is expected what was there before something wrote over it.
+fn put_back(saved: &SavedValue, expected: &mut Snapshot) {
+    match (saved.slot, &saved.value) {
+        (Slot::Property(property), Saved::Property(value)) => {
+            let one = expected.components.get_mut(&property.component);
+            let there = one.and_then(|one| one.properties.get_mut(&property.member));
+            there.into_iter().for_each(|there| *there = value.clone());
+        }
+        (Slot::Port(port), Saved::Port(Some(value))) if expected.components.contains_key(&port.component) => {
+            expected.ports.insert(port, value.clone());
+        }
+        (Slot::Port(port), Saved::Port(None)) => drop(expected.ports.remove(&port)),
+        _ => {}
+    }
+}
+
+impl Frame {
+    /// What has ended *broken* while the one that this is to be the frame of was being applied is not expected with what that has `done` already: its
+    /// undo will take that back.
+    pub fn leaves_out(&self, done: &[&Step], expected: &mut Snapshot) {
+        let wrote = |slot: Slot| done.iter().any(|step| absolute(step) == Some(slot));
+        self.saved.iter().filter(|saved| wrote(saved.slot)).for_each(|saved| put_back(saved, expected));
+        for (name, one) in &mut expected.components {
+            let mut moves = done.iter().filter_map(|step| match step {
+                Step::State { component, transition } if component == name => Some(*transition),
+                _ => None,
+            });
+            if let Some(first) = moves.next()
+                && moves.next_back().unwrap_or(first).target() == one.state
+            {
+                one.state = first.inverse().target();
+            }
+        }
     }
 }
 

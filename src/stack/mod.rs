@@ -433,8 +433,14 @@ impl Stack {
     }
 
     /// Pushes the frame of a safe configuration that has been applied as far as it goes, with what goes with it. Frames of what is `broken`
-    /// are not squashed, but one of their group takes their place.
-    pub fn push_safe(&mut self, edits: Edits, frame: Frame, busy: &[FrameId], broken: &[FrameId]) -> FrameId {
+    /// are not squashed, but one of their group takes their place, where they are not ordinary ones that it leaves `apart`.
+    pub fn push_safe(
+        &mut self,
+        edits: Edits,
+        frame: Frame,
+        busy: &[FrameId],
+        (broken, apart): (&[FrameId], &[FrameId]),
+    ) -> FrameId {
         let kept: SmallVec<[FrameId; 4]> = busy.iter().chain(broken).copied().collect();
         let busy: SmallVec<[FrameId; 4]> = busy.iter().copied().filter(|id| !edits.over.contains(id)).collect();
         let push = Some(Arc::new(Frame { safe: true, ..frame }));
@@ -443,7 +449,7 @@ impl Stack {
         self.bound = bound.saturating_add(1);
         let pushed = self.apply([&Edits { push, ..edits }], &kept).first().copied().unwrap_or(FrameId(0));
         self.bound = bound;
-        effort::take_over_group(&mut self.frames, pushed, &busy);
+        effort::take_over_group(&mut self.frames, pushed, &busy, apart);
         if let Some(pile) = self.frame(pushed).map(|frame| frame.pile()) {
             let busy: SmallVec<[FrameId; 4]> = kept.into_iter().chain(waits.then_some(pushed)).collect();
             let room = squash::Quota { pile, bound, busy: &busy };
@@ -455,7 +461,7 @@ impl Stack {
     /// How it will be when a safe configuration that is being applied has come to its end, whose frame has this number until then.
     pub fn expecting(&self, edits: Edits, frame: Frame, id: FrameId) -> Self {
         let mut expected = Self { next: id.0, ..self.clone() };
-        expected.push_safe(edits, frame, &[], &[]);
+        expected.push_safe(edits, frame, &[], (&[], &[]));
         expected
     }
 

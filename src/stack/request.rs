@@ -57,14 +57,14 @@ pub enum Stillness {
     No,
     /// It was raised in the same step as a `safe` configuration.
     WithSafe,
-    /// A `safe` configuration came while it stood behind others of its batch.
-    Overtaken,
+    /// This `safe` configuration came while it stood behind others of its batch: it is applied no more, and undone as far as nothing moves.
+    Overtaken(ConfigId),
 }
 
 impl Stillness {
     /// A `safe` configuration comes.
     pub fn come(&mut self, how: Self) {
-        if *self == Self::No {
+        if *self == Self::No || matches!((*self, how), (Self::WithSafe, Self::Overtaken(_))) {
             *self = how;
         }
     }
@@ -148,9 +148,18 @@ impl Request {
         Some(left)
     }
 
+    /// The `safe` configuration over which it is not applied any more: that came while it stood behind others.
+    pub fn is_overtaken(&self) -> Option<ConfigId> {
+        match (self.ask, self.still) {
+            (Ask::Apply(_), Stillness::Overtaken(by)) => Some(by),
+            _ => None,
+        }
+    }
+
     /// Whether it is refused for nothing but a `safe` configuration that came while it stood behind others.
     pub fn was_overtaken(&self, refused: &[Finding]) -> bool {
-        self.still == Stillness::Overtaken && refused.iter().all(|reason| reason.code == codes::MOVES_WHILE_SAFE)
+        matches!(self.still, Stillness::Overtaken(_))
+            && refused.iter().all(|reason| reason.code == codes::MOVES_WHILE_SAFE)
     }
 
     /// Whether what it is answered is for the state that asked, and for nobody once that has been left. What came of a

@@ -3,7 +3,7 @@
 //! The parts of a group end in order: those before one that failed stand, and what stands behind it is taken up anew, since
 //! it was decided for a system in which that one is done. Where a safe configuration interrupts a group all of it ends.
 
-use super::effort::without;
+use super::effort::{owed_no_more, without};
 use super::squash::list;
 use super::{Edits, Frame, FrameId, Group, Request, Why, World};
 use crate::model::{Ask, Step, Verdict};
@@ -73,6 +73,8 @@ pub struct SafeEnd<'f> {
     pub missed: &'f [Step],
     /// A piece of it could not even be planned.
     pub left_out: bool,
+    /// The steps that were done, also of taking back those whose place it takes.
+    pub done: &'f [Step],
     /// It was planned for another system than there was: something is interrupted for its sake, or was broken.
     pub interrupts: bool,
 }
@@ -153,17 +155,26 @@ impl World {
     ) -> (FrameId, Verdict) {
         let broken = end.failed.is_some();
         let mut busy: SmallVec<[FrameId; 4]> = SmallVec::from_slice(busy);
+        let (mut others, planned) = (edits.over.clone(), (!end.done.is_empty()).then(|| frame.clone()));
         if broken {
             // What was done of it undoes what was done, and no more: what it was to take the place of is taken over with what that undoes,
             // also where something else was under way, and about that itself: else that would seem to be in force, whatever was left of it.
             busy.retain(|frame| edits.pops.iter().all(|(id, _)| id != frame));
-            edits.pops.clear();
+            others.extend(edits.pops.drain(..).map(|(id, _)| id));
         }
         let frame = match end.failed {
             None if end.missed.is_empty() => frame,
             Some(done) if !end.interrupts => Frame { partial: true, ..done.cloned().unwrap_or(frame) },
             // As if what was interrupted had never been; what an earlier one was to do and did not is not done either.
             _ => without(frame, end.missed),
+        };
+        let frame = match &planned {
+            Some(own) => {
+                let (frame, made_up) = owed_no_more(&mut self.stack, &others, own, frame, end.done);
+                self.expects_done(&made_up, None);
+                frame
+            }
+            None => frame,
         };
         let verdict = if broken || end.left_out { Verdict::Broken } else { Verdict::Ok };
         // What is broken is repaired by the undo of its frame: of the one that takes the place of that.
@@ -178,13 +189,18 @@ impl World {
             // Its own undo leads back from there, beside what is broken.
             self.expects_back(&connections(&frame));
         }
-        let pushed = self.stack.push_safe(edits, frame, &busy, &broken);
+        // What it was to take the place of, and what it was not.
+        let apart: Vec<FrameId> = broken.iter().filter(|id| !others.contains(id)).copied().collect();
+        let own = frame.saved.clone();
+        let pushed = self.stack.push_safe(edits, frame, &busy, (&broken, &apart));
         if !before.is_empty() {
             let after = self.stack.clone();
-            self.expects_no_more(&before, |frame| {
+            let taken = |frame: &Frame| {
                 let of_group = group.is_some() && frame.group == group && !after.has_squashed(frame);
                 after.frame(frame.id).is_none() && (gone.contains(&frame.id) || of_group)
-            });
+            };
+            self.expects_no_more(&before, taken);
+            self.answers_for(&before, taken, pushed, &own);
             self.takes_back_what_is_there(pushed);
         }
         let gone: Vec<FrameId> = broken.into_iter().filter(|frame| self.stack.frame(*frame).is_none()).collect();

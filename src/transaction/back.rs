@@ -8,8 +8,8 @@ use super::touched::Touched;
 use crate::model::{Cause, OnFailure, RunState, Step};
 use crate::plan::backwards::Backwards;
 use crate::plan::{PlannedStep, StepId};
-use crate::stack::Reason;
-use crate::system::touch::components;
+use crate::stack::{FrameId, Reason};
+use crate::system::touch::{absolute, components};
 use crate::system::{Overlay, System, Undo, View, diff, step};
 use rustc_hash::FxHashSet;
 use smallvec::SmallVec;
@@ -263,11 +263,13 @@ impl Transaction {
         GoesBack { late: late.is_some(), stays, steps: if stays { &[] } else { &undo[done..] } }
     }
 
-    /// Whether a call stays, whoever made it, since safe configurations that are in force, or that these were touched by, have
-    /// made it too.
+    /// Whether a step stays: a call, whoever made it, since safe configurations that are in force, or that these were touched by, have made it too;
+    /// and what takes back a frame whose place they have taken, or that would come back.
     fn is_kept(&self, step: &Step, touched: &Touched) -> bool {
         let kept = |of| self.planned.kept.contains(of) || touched.calls.contains(of);
+        let pops = |id: FrameId| self.planned.popped.iter().any(|popped| popped.id == id);
         matches!(step, Step::Operation(call) if kept(&call.operation))
+            || absolute(step).is_none() && touched.gone.iter().any(|(id, of)| of == step && pops(*id))
     }
 
     /// The steps that are still to be done to take a step of the forward list back.

@@ -45,6 +45,11 @@ impl Transaction {
         forward.failures.iter().map(|(i, _)| &forward.list[*i as usize])
     }
 
+    /// The steps of a best effort that were done, for all that is known.
+    pub fn done_steps(&self) -> impl Iterator<Item = &Step> {
+        self.forward.done.iter().map(|i| &self.forward.list[*i as usize].step)
+    }
+
     /// The steps of a best effort that are not over, each with whether it is out.
     pub fn still_to_do(&self) -> impl Iterator<Item = OpenStep> + '_ {
         self.forward.open().map(|(planned, begun)| OpenStep { step: planned.step.clone(), begun })

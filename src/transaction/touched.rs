@@ -2,7 +2,7 @@
 
 use crate::model::{ComponentName, MemberRef, RunState, Step, Value, Wanted};
 use crate::plan::undo::absolute;
-use crate::stack::{Frame, calls};
+use crate::stack::{Frame, FrameId, calls};
 use crate::system::touch::{Slot, components, slot};
 use rustc_hash::{FxHashMap, FxHashSet};
 
@@ -19,6 +19,8 @@ pub struct Touched {
     pub(super) states: FxHashMap<ComponentName, RunState>,
     /// Operations that they have called, and take back by themselves.
     pub(super) calls: FxHashSet<MemberRef>,
+    /// Frames whose place they have taken, with what takes each of them back: who was doing that leaves it done.
+    pub(super) gone: Vec<(FrameId, Step)>,
 }
 
 impl Touched {
@@ -45,9 +47,10 @@ impl Touched {
         self.states.insert(component, wanted.into());
     }
 
-    /// Values that this frame has given are not in force any more: what they were before is.
+    /// What this frame has done is not in force any more: what was before is.
     pub fn takes_place_of(&mut self, frame: &Frame) {
         self.slots.extend(frame.saved.iter().map(|saved| saved.slot));
+        self.gone.extend(frame.taking_back().into_iter().map(|item| (frame.id, item.step)));
     }
 
     /// That is the frame that they leave: its calls are theirs, and only theirs.
@@ -93,6 +96,7 @@ impl Touched {
         self.ports.extend(other.ports);
         self.states.extend(other.states);
         self.calls.extend(other.calls);
+        self.gone.extend(other.gone);
     }
 
     /// The run state that is wanted of `component`, if one is.
@@ -110,7 +114,7 @@ impl Touched {
 
     /// Whether nothing was.
     pub fn is_empty(&self) -> bool {
-        self.slots.is_empty()
+        self.slots.is_empty() && self.gone.is_empty()
     }
 
     /// Whether `step` would change something touched.

@@ -118,7 +118,7 @@ fn however_they_come_and_whatever_fails_the_end_takes_all_of_it_back() {
     }
 }
 
-const ARM: &str = "davit: 1
+pub const ARM: &str = "davit: 1
 name: arm
 platform: simulated
 types:
@@ -139,7 +139,7 @@ deploy: { event: e_start, up: up.idle, failed: [failed], within_s: 5 }
 shutdown: { event: e_end, down: off, within_s: 30 }
 ";
 
-const CHART: &str = "coordinator:
+pub const CHART: &str = "coordinator:
   states:
     off: {}
     up:
@@ -341,5 +341,77 @@ fn what_the_first_one_missed_is_made_up_for_and_the_end_takes_all_of_it_back() {
         let ran = demo.run(&["run", "s.lua", "--clock", "simulated", "--quiet"]);
         let told: Vec<&str> = ran.out.lines().collect();
         assert_eq!((told.as_slice(), ran.code), (&[held, end][..], 0), "{all:#?} {fault} {events}\n{}", ran.err);
+    }
+}
+
+/// What has been taken back when the first one failed is not called once more by who comes again, and its end calls nothing that nobody has asked for.
+#[test]
+fn what_was_taken_back_already_is_called_no_more() {
+    let motor = "build: { changes: [{ create: { component: m, type: Motor } }] }";
+    let run = "run: { pre_conf_state: [\"m:stopped\"], post_conf_state: [\"m:running\"] }";
+    let clamped = "slow: { group: speed, changes: [{ port_write: { port: m.speed, value: 0.4 } }, { operation_call: { operation: m.clamp } }] }";
+    let unclamped = "slow: { group: speed, changes: [{ operation_call: { operation: m.clamp } }] }";
+    let down = "slow: { group: speed, post_conf_state: [\"m:unconfigured\"] }";
+    let brake = "safe: true, group: speed, changes: [{ operation_call: { operation: m.brake } }]";
+    // It does itself what takes the other one back, too.
+    let opens = "safe: true, group: speed, changes: [{ operation_call: { operation: m.unclamp } }, { property_set: { property: m.limit, value: 1.0 } }]";
+    let away = "safe: true, group: speed, post_conf_state: [\"m:unconfigured\"]";
+    let table = [
+        (clamped, brake, brake, "port_write m.speed", "stop", "unclamp brake | release"),
+        (clamped, brake, brake, "operation_call m.brake", "stop", "unclamp |"),
+        (clamped, brake, brake, "operation_call m.brake", "stop stop", "unclamp | brake | release"),
+        (clamped, brake, brake, "operation_call m.unclamp", "stop", "brake | release unclamp"),
+        (clamped, brake, brake, "operation_call m.unclamp", "stop stop", "brake | unclamp brake | release"),
+        (clamped, brake, brake, "operation_call m.unclamp", "stop halt", "brake | unclamp brake | release"),
+        (unclamped, opens, brake, "property_set m.limit", "stop", "unclamp unclamp | clamp"),
+        (unclamped, opens, brake, "property_set m.limit", "stop halt", "unclamp unclamp | brake | release clamp"),
+        (
+            down,
+            away,
+            &format!("{away}, changes: [{{ operation_call: {{ operation: m.brake }} }}]"),
+            "operation_call m.brake",
+            "halt stop",
+            "| |",
+        ),
+    ];
+    for (slow, stop, halt, fails, events, calls) in table {
+        let demo = Demo::new();
+        let limit = "    operations:\n      brake:";
+        let properties = "    properties: { limit: { type: float, default: 5.0 } }\n    operations:\n      brake:";
+        demo.write("deployment.yaml", &ARM.replace(limit, properties));
+        demo.write("k.yaml", &CHART.replace("IDLE", "config: slow"));
+        let all = [motor, run, slow, &format!("stop: {{ {stop} }}"), &format!("halt: {{ {halt} }}")].join("\n  ");
+        demo.write("c.yaml", &format!("configurations:\n  {all}\n"));
+        let raised: String = events.split(' ').map(|event| format!("raise('e_{event}') wait(2) ")).collect();
+        let script = format!(
+            "deploy('deployment.yaml') wait(0.2) fault('{fails}', 'fail', 1) {raised}
+             raise('e_reset') wait(3) say(state('m') .. ' ' .. tostring(port('m.speed')) .. ' ' .. #drift()) shutdown()"
+        );
+        demo.write("s.lua", &script);
+        let ran = demo.run(&["run", "s.lua", "--clock", "simulated", "--json"]);
+        let lines: Vec<serde_json::Value> =
+            ran.out.lines().filter_map(|line| serde_json::from_str(line).ok()).collect();
+        let end = lines.iter().position(|line| line["what"] == "said").expect("it has come to its end");
+        assert_eq!(
+            (lines[end]["text"].as_str(), ran.code),
+            (Some("running nil 0"), 0),
+            "{all} {fails} {events}\n{}",
+            ran.out
+        );
+        let answers = lines[..end].iter().filter(|line| {
+            let of = line["answer"].as_str().unwrap_or_default();
+            line["what"] == "answered" && (of.starts_with("stop") || of.starts_with("halt"))
+        });
+        let called: Vec<String> = answers
+            .map(|answer| {
+                let done = answer["steps"].as_array().into_iter().flatten().filter(|step| step["outcome"] == "done");
+                let call =
+                    done.filter_map(|step| step["step"].as_str()?.strip_prefix("operation_call m.").map(str::to_owned));
+                call.collect::<Vec<String>>().join(" ")
+            })
+            .filter(|calls| !calls.is_empty())
+            .collect();
+        let wanted: Vec<&str> = calls.split('|').map(str::trim).filter(|calls| !calls.is_empty()).collect();
+        assert_eq!(called, wanted, "{all} {fails} {events}\n{}", ran.out);
     }
 }

@@ -64,6 +64,10 @@ fn explain_lists_and_explains_every_code() {
 
 #[test]
 fn explain_tells_what_a_key_means() {
+    for (slip, meant) in [("configuration.tmeout", "configuration.timeout"), ("type.ports.unti", "type.ports.unit")] {
+        let unknown = at_home(&["explain", slip]);
+        assert!(unknown.code == 1 && unknown.err.contains(&format!("did you mean `{meant}`?")), "{}", unknown.err);
+    }
     let timeout = at_home(&["explain", "timeout"]);
     assert_eq!(timeout.code, 0, "{}", timeout.err);
     for part in ["configuration.timeout", "in seconds", "timeout = 0.5", "timeout: 0.5", "text::bad_time"] {

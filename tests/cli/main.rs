@@ -52,6 +52,7 @@ mod stalled;
 mod standings;
 mod stopping;
 mod sweeping;
+mod taken_back;
 mod together;
 mod told;
 #[path = "../lang/tongue.rs"]

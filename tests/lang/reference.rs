@@ -321,12 +321,28 @@ fn the_schema_says_what_reading_says() {
             }
             let beyond = BEYOND.contains(&key.code)
                 || (["property", "parameter"].contains(&object.name) && key.refused == "type: event");
-            // What is inside a condition it does not look at; a connector that is none is a state to it.
-            let unseen = matches!(object.name, "comparison" | "connector");
-            if !beyond && !unseen {
+            // A connector that is none is a state to it.
+            if !beyond && object.name != "connector" {
                 assert!(!validator.is_valid(&as_json(&refused)), "{what}: `{}` passes the schema", key.refused);
             }
         }
+    }
+}
+
+/// An editor underlines a slip however deep it stands in a condition.
+#[test]
+fn the_schema_knows_the_words_inside_of_conditions() {
+    let file = FILES.iter().find(|file| file.name == "monitors").expect("monitors");
+    let validator = validator(file);
+    let holds = |when: &str| {
+        let text = format!("monitors:\n  m:\n    when: {when}\n    event: e_x\n");
+        validator.is_valid(&as_json(&serde_yaml::from_str(&text).expect("it is YAML")))
+    };
+    let right =
+        "{ all: [{ above: [{ norm: [\"A.x\", \"A.y\"] }, 2.0, { hysteresis: 0.5 }] }, { no: { is_true: A.ready } }] }";
+    assert!(holds(right));
+    for (word, slip) in [("above", "abve"), ("norm", "nrm"), ("hysteresis", "hysteresi"), ("is_true", "istrue")] {
+        assert!(!holds(&right.replace(word, slip)), "{slip}");
     }
 }
 
@@ -457,6 +473,7 @@ fn the_annotations_are_lua_and_name_every_constructor() {
         if is_field && !of_call {
             let named = [format!("@field {}", key.name), format!("@param {}", key.name)];
             assert!(named.iter().any(|name| text.contains(name)), "{}.{}", object.name, key.name);
+            assert!(text.contains(&key.told()), "{}.{}: not all of it is told", object.name, key.name);
         }
     }
 }

@@ -46,6 +46,12 @@ fn deployment_keys_names_and_values() {
     let table = [
         ("name: arm", "nmae: arm", "text::unknown_key 2:1", "`name`"),
         ("name: arm", "name: 3arm", "text::bad_name 2:7", "name: youbot_arm"),
+        (
+            "name: arm",
+            "name: a_name_with_more_letters_than_there_are_in_the_name_of_a_socket__",
+            "text::bad_name 2:7",
+            "at a file of that name",
+        ),
         ("name: arm", "name: 12", "text::wrong_type 2:7", "quotes"),
         ("name: arm\n", "", "text::missing_key 1:1", "name: "),
         ("davit: 1", "davit: 2", "text::bad_value 1:8", "davit: 1"),
@@ -460,5 +466,41 @@ fn examples_are_in_the_language_of_the_file() {
     for (from, to, expected, hint) in table {
         assert!(text.contains(from), "`{from}` is not in the example");
         answers.one(&yaml(&text.replacen(from, to, 1)), (from, to), expected, hint);
+    }
+}
+
+/// What there is instead of an unknown key is what can be written there.
+#[test]
+fn the_keys_that_there_are_are_those_of_the_language() {
+    let told = |loaded: &Loaded| -> String { loaded.findings.iter().filter_map(|found| found.help.clone()).collect() };
+    let lua = [
+        ("c.lua", LUA, "timeout = 0.5", "xyzq = 0.5", "`timeout`", &["`changes`"][..]),
+        ("c.lua", LUA, "{ buffer = 8 }", "{ xyzq = 8 }", "`buffer`", &["`from`", "`to`"]),
+        (
+            "k.lua",
+            COORDINATOR,
+            "idle = state {}",
+            "idle = state { xyzq = 1 }",
+            "`entry`",
+            &["`states`", "`transitions`"],
+        ),
+    ];
+    for (file, text, from, to, known, others) in lua {
+        let told = told(&replaced(file, text, from, to));
+        assert!(told.contains(known) && others.iter().all(|other| !told.contains(other)), "{to}: {told}");
+    }
+    let text =
+        "coordinator:\n  states:\n    idle: { xyzq: 1 }\n  transitions:\n    - { src: initial, tgt: idle, xyzp: 1 }\n";
+    let yaml =
+        lang::load_coordinator(&Sources::memory([("k.yaml", text)]), Path::new("k.yaml"), &LoadOptions::default());
+    let told: String = yaml.findings.iter().filter_map(|found| found.help.clone()).collect();
+    assert!(told.contains("`states`") && told.contains("`effect`"), "{told}");
+    assert!(!told.contains("`doo`") && !told.contains("`guard`"), "{told}");
+    // In Lua changes stand in a configuration as they are, also where there are none.
+    let mut answers = Answers::default();
+    for changes in ["changes = {},", "changes = { destroy(\"A\") },", "changes = 1,"] {
+        let to = format!("{changes} timeout = 0.5,");
+        let loaded = replaced("c.lua", LUA, "timeout = 0.5,", &to);
+        answers.one(&loaded, ("timeout = 0.5,", &to), "text::unknown_key 2:24", "stand in it as they are");
     }
 }

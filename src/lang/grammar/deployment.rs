@@ -25,7 +25,7 @@ pub static DEPLOYMENT: Object = Object {
         key("davit", Form::Version, "The version of the format.", "davit: 1", ("davit: 2", TEXT_BAD_VALUE)).required(),
         key(
             "name",
-            Form::Name(NameKind::Plain),
+            Form::Name(NameKind::Deployment),
             "What the deployment is called: by commands, and by its control socket.",
             "name: youbot_arm",
             ("name: 3arm", TEXT_BAD_NAME),

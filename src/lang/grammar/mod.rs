@@ -156,6 +156,8 @@ pub enum Form {
 pub enum NameKind {
     /// A plain name.
     Plain,
+    /// A deployment: a plain name that is short enough for a file at which it is reached.
+    Deployment,
     /// A component.
     Component,
     /// A component type.
@@ -173,6 +175,7 @@ impl NameKind {
     pub fn what(self) -> &'static str {
         match self {
             Self::Plain => "a name (letters, digits and `_`, no digit first)",
+            Self::Deployment => "a name (letters, digits and `_`, no digit first; at most 64 letters)",
             Self::Component => "the name of a component",
             Self::Type => "the name of a component type",
             Self::Configuration => "the name of a configuration",
@@ -185,6 +188,7 @@ impl NameKind {
     pub fn pattern(self) -> &'static str {
         match self {
             Self::Plain => "^[A-Za-z_][A-Za-z0-9_]*$",
+            Self::Deployment => "^[A-Za-z_][A-Za-z0-9_]{0,63}$",
             Self::Component | Self::Configuration => "^[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*$",
             Self::Type => "^([A-Za-z_][A-Za-z0-9_]*/)*[A-Za-z_][A-Za-z0-9_]*(\\.[A-Za-z_][A-Za-z0-9_]*)*$",
             Self::Event => "^\\S+$",
@@ -262,6 +266,14 @@ impl Key {
             _ => self.unit,
         }
     }
+
+    /// What an editor tells of it: its meaning, its unit, and what is so without it.
+    pub fn told(&self) -> String {
+        let (unit, default) = (self.unit_of(), self.default);
+        let unit = if unit.is_empty() { String::new() } else { format!(" Unit: {unit}.") };
+        let default = if default.is_empty() { String::new() } else { format!(" Without it: {default}.") };
+        format!("{}{unit}{default}", self.doc)
+    }
 }
 
 impl Object {
@@ -273,9 +285,21 @@ impl Object {
         self.keys.iter().find(|key| key.name == name)
     }
 
-    /// The keys that can be written, for *did you mean*.
+    /// The keys that can be written in one of the languages.
     pub fn names(&self) -> impl Iterator<Item = &'static str> {
         self.keys.iter().filter(|key| key.language != Languages::None).map(|key| key.name)
+    }
+
+    /// Those that can be written in Lua, or in YAML, for *did you mean*. In Lua changes stand by themselves, and a constructor has arguments.
+    pub fn names_in(&self, lua: bool) -> impl Iterator<Item = &'static str> {
+        let arguments = primitive(self.name).filter(|_| lua).map_or(&[][..], |made| made.arguments);
+        let is_there = move |key: &&Key| match key.language {
+            Languages::All => !(arguments.contains(&key.name) || lua && matches!(key.form, Form::Changes)),
+            Languages::Lua => lua,
+            Languages::Yaml => !lua,
+            Languages::None => false,
+        };
+        self.keys.iter().filter(is_there).map(|key| key.name)
     }
 
     /// How it is written in YAML.

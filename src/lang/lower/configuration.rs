@@ -80,14 +80,17 @@ pub fn configuration(cx: &mut Cx, id: ConfigId, node: Node, origin: Origin) -> O
         ["on_failure", "confirm"].map(|key| fields.place(key).map(|origin| cx.part(origin, key)));
     bound::CONFIGURATION.read(&mut c, &mut fields, cx);
     let mut changes = listed;
+    let key = fields.place("changes").map(|origin| cx.part(origin, "changes"));
     if let Some(node) = fields.take(cx, "changes") {
         match node.kind {
+            _ if cx.is_lua(origin) => cx.report(
+                Finding::error(codes::TEXT_UNKNOWN_KEY, "a configuration has no `changes` in Lua")
+                    .at(key.unwrap_or(origin))
+                    .labelled("unknown key")
+                    .help("its changes stand in it as they are: `Configuration { destroy(\"Dynamics\"), … }`"),
+            ),
             Kind::List(list) => changes.extend(list),
-            _ => {
-                let lua = "changes = { destroy(\"Dynamics\") }";
-                let example = cx.either(origin, lua, "changes: [{ destroy: { component: Dynamics } }]");
-                cx.wrong(&node, "`changes`", "a list", &example);
-            }
+            _ => cx.wrong(&node, "`changes`", "a list", "changes: [{ destroy: { component: Dynamics } }]"),
         }
     }
     c.changes = Vec::with_capacity(changes.len());

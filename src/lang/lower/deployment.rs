@@ -6,6 +6,7 @@ use super::{by_name, entries, name, own_name, simulated, text, types, value};
 use crate::lang::bound;
 use crate::lang::grammar::{ACTIVITY, DEPLOYMENT, Form, TRUSTED, TYPE};
 use crate::lang::tree::{Cx, Entry, Fields, Kind, Node};
+use crate::limits;
 use crate::model::finding::did_you_mean;
 use crate::model::{
     Activity, BringUp, Deployment, EventName, Finding, Ident, Openings, Origin, PlatformKind, TakeDown, Value, codes,
@@ -146,7 +147,7 @@ pub fn draft(cx: &mut Cx, node: Node, file_name: &str) -> Option<Draft> {
     }
     let mut out = Draft::new()?;
     let own = fields.needed(cx, "name", |_, _| format!("add `name: {file_name}`"));
-    let own = own.and_then(|node| name::<Ident>(cx, &node, "`name`", fields.row("name").example));
+    let own = own.and_then(|node| called(cx, &node, fields.row("name").example));
     out.needed(own).into_iter().for_each(|own| out.deployment.name = own);
     let platform = platform(cx, &mut fields);
     if let Some((platform, options)) = out.needed(platform) {
@@ -194,6 +195,23 @@ pub fn draft(cx: &mut Cx, node: Node, file_name: &str) -> Option<Draft> {
     fields.finish(cx);
     out.deployment.key_origins = key_origins;
     Some(out)
+}
+
+/// The deployment's name: a file is called like that, and commands reach it there.
+fn called(cx: &mut Cx, node: &Node, example: &str) -> Option<Ident> {
+    let own: Ident = name(cx, node, "`name`", example)?;
+    let letters = own.as_str().len();
+    if letters <= limits::DEPLOYMENT_NAME {
+        return Some(own);
+    }
+    let (at_most, origin) = (limits::DEPLOYMENT_NAME, cx.place(node));
+    cx.report(
+        Finding::error(codes::TEXT_BAD_NAME, format!("a deployment's name of {letters} letters"))
+            .at(origin)
+            .labelled(format!("at most {at_most}"))
+            .help("commands reach it at a file of that name: choose a shorter one"),
+    );
+    None
 }
 
 /// `platform: NAME`, or `platform: { NAME: { option: value } }`.

@@ -3,8 +3,8 @@
 //! It is no more than a first look: what it refuses, reading refuses too (a test compares them); what it lets stand may still be
 //! refused for what stands in other places.
 
-use crate::lang::grammar::{CHANGES, File, Form, Key, NameKind, Object, Words};
-use crate::lang::words::{CONDITIONS, Word};
+use crate::lang::grammar::{CHANGES, COMPARISON, File, Form, Key, NameKind, Object, Words};
+use crate::lang::words::{CONDITIONS, SIGNALS, Word};
 use crate::model::RunState;
 use serde_json::{Map, Value, json};
 
@@ -17,6 +17,7 @@ pub fn json_schema(file: &File) -> Value {
     definitions.insert("value".to_owned(), any_value());
     definitions.insert("value_type".to_owned(), value_type());
     definitions.insert("condition".to_owned(), condition());
+    definitions.insert("argument".to_owned(), argument());
     definitions.insert("change".to_owned(), change());
     // What nothing refers to would only be noise.
     let mut whole = object(file.object);
@@ -88,14 +89,7 @@ fn row(key: &Key) -> Value {
         }
         reference => json!({ "allOf": [reference] }),
     };
-    let mut text = key.doc.to_owned();
-    if !key.unit_of().is_empty() {
-        text.push_str(&format!(" Unit: {}.", key.unit_of()));
-    }
-    if !key.default.is_empty() {
-        text.push_str(&format!(" Without it: {}.", key.default));
-    }
-    out["description"] = json!(text);
+    out["description"] = json!(key.told());
     out
 }
 
@@ -158,11 +152,26 @@ fn value_type() -> Value {
     })
 }
 
+/// A word with its arguments.
+fn word_of(word: &Word) -> (String, Value) {
+    let of = json!({ "type": ["array", "string", "object"], "allOf": [refer("argument")], "description": word.doc });
+    (word.name.to_owned(), of)
+}
+
+/// What a word may be said of: values, members, further words, and how a comparison is made.
+fn argument() -> Value {
+    let mut words: Map<String, Value> = CONDITIONS.iter().chain(SIGNALS).map(word_of).collect();
+    words.extend(COMPARISON.yaml_keys().map(|key| (key.name.to_owned(), row(key))));
+    // Each of these is asked of the kind of value that it is about.
+    json!({
+        "type": ["number", "string", "boolean", "array", "object"],
+        "items": refer("argument"), "properties": words, "additionalProperties": false,
+    })
+}
+
 /// One word with its arguments.
 fn condition() -> Value {
-    let one =
-        |word: &Word| (word.name.to_owned(), json!({ "type": ["array", "string", "object"], "description": word.doc }));
-    let words: Map<String, Value> = CONDITIONS.iter().map(one).collect();
+    let words: Map<String, Value> = CONDITIONS.iter().map(word_of).collect();
     json!({
         "description": "A condition: one word, with its argument or the list of its arguments.",
         "type": "object", "minProperties": 1, "maxProperties": 1, "properties": words, "additionalProperties": false,

@@ -3,6 +3,7 @@
 
 use crate::lang::grammar::{
     CHANGES, CONFIGURATION, CONNECTOR, FILES, Form, Key, Languages, MONITOR, Object, Primitive, STATE, TRANSITION,
+    Words,
 };
 use crate::lang::words::{CONDITIONS, SIGNALS, Word};
 use std::fmt::Write as _;
@@ -90,7 +91,12 @@ fn field(out: &mut String, key: &Key) {
     let only_yaml = matches!(key.language, Languages::Yaml | Languages::None) || matches!(key.form, Form::Changes);
     if !only_yaml {
         let optional = if key.required { "" } else { "?" };
-        _ = writeln!(out, "---@field {}{optional} {} {}", key.name, kind(&key.form), key.doc);
+        // Of numbers the type says less than there is to say.
+        let range = match key.form {
+            Form::Whole { .. } | Form::Seconds | Form::Milliseconds => format!("({}) ", key.form.words(Words::Plain)),
+            _ => String::new(),
+        };
+        _ = writeln!(out, "---@field {}{optional} {} {range}{}", key.name, kind(&key.form), key.told());
     }
 }
 
@@ -112,7 +118,7 @@ fn primitive(out: &mut String, primitive: &Primitive) {
             }
             (_, Some(key)) => {
                 let optional = if key.required { "" } else { "?" };
-                _ = writeln!(out, "---@param {argument}{optional} {} {}", kind(&key.form), key.doc);
+                _ = writeln!(out, "---@param {argument}{optional} {} {}", kind(&key.form), key.told());
                 names.push(argument);
             }
             (_, None) => {

@@ -7,4 +7,4 @@ mod reference;
 
 pub use json::json_schema;
 pub use lua::annotations;
-pub use reference::{Example, ReferenceEntry, about, markdown, names};
+pub use reference::{Example, ReferenceEntry, about, keys_of, markdown, names};

@@ -170,6 +170,11 @@ pub fn about(name: &str) -> Vec<ReferenceEntry> {
     found
 }
 
+/// The keys of the tables that a path leads to: of `type.ports` those of a port.
+pub fn keys_of(path: &str) -> Vec<&'static str> {
+    tables(path).into_iter().flat_map(Object::names).collect()
+}
+
 /// Every name that [`about`] knows, each once.
 pub fn names() -> Vec<&'static str> {
     let objects = FILES.iter().flat_map(File::objects);

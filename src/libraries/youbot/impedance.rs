@@ -86,7 +86,7 @@ impl Default for ImpedanceParameters {
 pub const FADE: f64 = 0.1;
 /// Time in which it takes hold, in s.
 pub const ENGAGE: f64 = 0.3;
-/// Damping on the own velocity per stiffness and delay (youbot.md §3.2): 1 is what the delay takes, the rest is for what varies.
+/// Damping on the own velocity per stiffness and delay (`docs/youbot.md`, *How slow a network may be*): 1 is what the delay takes, the rest is for what varies.
 pub const DELAY_DAMPING: f64 = 1.2;
 /// What the delay asks for is taken on the average over about so long, in s.
 const DELAY_TIME: f64 = 0.2;

@@ -1,5 +1,5 @@
 //! Every statement about pure charts that was confirmed by running rFSM (marked [P] in `docs/rfsm.md`), and the gaps that its
-//! own tests leave (§10), by theme. What functions and the API have to do with is in `tests/functions/confirmed`.
+//! own tests leave (`docs/rfsm.md` §10), by theme. What functions and the API have to do with is in `tests/functions/confirmed`.
 
 mod choosing;
 mod construction;

@@ -1,0 +1,366 @@
+//! An emergency leads back to where it came from: whatever of it was lost, late, slow or not true, however often it was pressed, and whatever it has
+//! interrupted. What it has taken the place of is not done again while it is in force, nor when it ends.
+
+use crate::alternatives::{ARM, CHART};
+use crate::demo::Demo;
+
+/// The chart of the alternatives, in which something ordinary is asked for, changed for another one, and let go of.
+fn chart() -> String {
+    let (idle, on) = ("idle: { IDLE }", "idle: {}, on: { config: slow }, on2: { config: fast }");
+    let begun = "        - { src: starting, tgt: idle, events: [run.ok] }\n";
+    let more = "        - { src: idle, tgt: on, events: [e_slow] }
+        - { src: on, tgt: on2, events: [e_fast] }
+        - { src: on, tgt: idle, events: [e_off] }\n";
+    assert!(CHART.contains(idle) && CHART.contains(begun), "the chart is another one");
+    let again = "    - { src: rest, tgt: again, events: [e_reset] }
+    - { src: again, tgt: down, events: [e_end] }
+    - { src: again, tgt: stopped, events: [e_stop] }
+    - { src: again, tgt: halted, events: [e_halt] }\n";
+    let rest = "    rest: {}\n    again: { entry: [stop.undo, halt.undo] }\n";
+    CHART
+        .replace(idle, on)
+        .replace(begun, &format!("{begun}{more}"))
+        .replace("    rest: {}\n", rest)
+        .replace("    - { src: rest, tgt: stopped", &format!("{again}    - {{ src: rest, tgt: stopped"))
+}
+
+/// What is made beside the motor `m`, the other configurations, what goes wrong, what comes when, and what is called from the first safety event on.
+type Case = (&'static str, [&'static str; 4], &'static str, &'static str, &'static str);
+
+const NOTHING: &str = "changes: [{ property_set: { property: m.limit, value: 0.5 } }]";
+const APART: &str = "changes: [{ disconnect: { from: l.o, to: m.ref } }]";
+const TOGETHER: &str = "changes: [{ connect: { from: l.o, to: m.ref, policy: data } }]";
+const BRAKE: &str = "changes: [{ operation_call: { operation: m.brake } }]";
+const CLAMP: &str = "changes: [{ operation_call: { operation: m.clamp } }]";
+const LIMIT: &str = "changes: [{ property_set: { property: m.limit, value: 0.1 } }]";
+const LIMIT_OPEN: &str = "changes: [{ property_set: { property: m.limit, value: 0.7 } }]";
+const STILL: &str = "changes: [{ port_write: { port: m.speed, value: 0.0 } }]";
+const OTHER: &str = "changes: [{ property_set: { property: n.limit, value: 0.1 } }]";
+const DOWN: &str = "post_conf_state: [\"m:unconfigured\"]";
+const N: &str = "create: { component: n, type: Motor }";
+const L: &str = "create: { component: l, type: Lamp }";
+const LED: &str = "create: { component: l, type: Lamp } }, { connect: { from: l.o, to: m.ref, policy: data }";
+
+/// `slow`, `fast`, `stop`, `halt`.
+const CASES: &[Case] = &[
+    // A step fails once, and another one comes: no run state is taken back twice.
+    (
+        N,
+        [
+            DOWN,
+            NOTHING,
+            DOWN,
+            "post_conf_state: [\"m:unconfigured\"], changes: [{ operation_call: { operation: m.brake } }]",
+        ],
+        "fault('operation_call m.brake', 'fail', 1)",
+        "slow 0.2 halt 2 stop 3",
+        "",
+    ),
+    // What was not true and was found out is the matter of the one that comes then.
+    (LED, [NOTHING, NOTHING, BRAKE, APART], "fault('disconnect l.o', 'lie', 1)", "halt 6 stop 1", "brake release"),
+    (
+        N,
+        [
+            "changes: [{ create: { component: k, type: Lamp } }, { connect: { from: k.o, to: m.ref, policy: data } }]",
+            NOTHING,
+            BRAKE,
+            LIMIT,
+        ],
+        "fault('disconnect k.o', 'lie', 1)",
+        "slow 0.2 stop 6 stop 3",
+        "brake brake release",
+    ),
+    // Two at a time: what the later one has done is no part of what the earlier one has left broken.
+    (
+        "create: { component: x, type: Lamp }",
+        ["changes: [{ destroy: { component: x } }, { operation_call: { operation: m.clamp } }]", NOTHING, STILL, LIMIT],
+        "fault('create x', 'lost', 1) fault('operation_call m.unclamp', 'lost', 1)",
+        "slow 0.2 halt 0.5 stop 3",
+        "unclamp",
+    ),
+    // What an earlier one was to write and did not is nothing that the later one gives back.
+    (
+        L,
+        [TOGETHER, NOTHING, STILL, STILL],
+        "fault('port_write m.speed = 0.0', 'lost', 1)",
+        "slow 0.2 stop 0 halt 3",
+        "",
+    ),
+    (
+        L,
+        [TOGETHER, NOTHING, LIMIT, STILL],
+        "fault('property_set m.limit', 'lost', 1) fault('disconnect l.o', 'lost', 1)",
+        "slow 0.2 stop 0.5 stop 5",
+        "",
+    ),
+    (
+        L,
+        [
+            TOGETHER,
+            NOTHING,
+            "post_conf_state: [\"m:stopped\"], changes: [{ port_write: { port: m.speed, value: 0.0 } }]",
+            STILL,
+        ],
+        "fault('port_write m.speed = 0.0', 'lost', 1)",
+        "slow 0.2 stop 0 halt 7 halt 2",
+        "",
+    ),
+    // What it interrupts has set what it sets as well, and the first press is lost.
+    (
+        N,
+        [
+            "changes: [{ property_set: { property: n.limit, value: 0.7 } }, { port_write: { port: m.speed, value: 0.5 } }]",
+            NOTHING,
+            OTHER,
+            LIMIT,
+        ],
+        "fault('port_write m.speed', 'slow', 1, 0.9) fault('property_set n.limit = 0.1', 'lost', 1)",
+        "slow 0.2 stop 0.02 stop 8",
+        "",
+    ),
+    // What the second press has called is taken back, though the first one had it to call, too.
+    (
+        N,
+        [
+            NOTHING,
+            NOTHING,
+            "pre_conf_state: [\"m:stopped\"], changes: [{ operation_call: { operation: m.clamp } }]",
+            LIMIT,
+        ],
+        "fault('stop m', 'late', 1)",
+        "stop 0.5 stop 9",
+        "clamp unclamp",
+    ),
+    // What the first one has made safe is not owed to what it has taken the place of, and what the second one makes up for stays done where it fails itself.
+    (
+        N,
+        [
+            CLAMP,
+            NOTHING,
+            "changes: [{ operation_call: { operation: m.clamp } }, { property_set: { property: n.limit, value: 0.1 } }]",
+            BRAKE,
+        ],
+        "fault('property_set n.limit', 'fail', 1)",
+        "slow 0.2 stop 2 halt 2",
+        "clamp brake release unclamp",
+    ),
+    (
+        N,
+        ["post_conf_state: [\"n:running\"]", NOTHING, BRAKE, LIMIT],
+        "fault('stop n', 'fail', 1) fault('property_set m.limit', 'fail', 1)",
+        "slow 0.2 stop 2 halt 2",
+        "brake release",
+    ),
+    (
+        N,
+        [
+            "changes: [{ port_write: { port: m.speed, value: 0.7 } }]",
+            NOTHING,
+            LIMIT,
+            "changes: [{ port_write: { port: n.speed, value: 0.0 } }]",
+        ],
+        "fault('port_write m.speed = 0.1', 'fail', 1) fault('property_set m.limit', 'fail', 1)",
+        "slow 0.2 halt 1 stop 2",
+        "",
+    ),
+    (
+        N,
+        [
+            "changes: [{ create: { component: k, type: Lamp } }]",
+            NOTHING,
+            LIMIT,
+            "changes: [{ port_write: { port: n.speed, value: 0.0 } }]",
+        ],
+        "fault('destroy k', 'fail', 1) fault('property_set m.limit', 'fail', 1)",
+        "slow 0.2 halt 1 stop 2 stop 2",
+        "",
+    ),
+    // What the first one is still taking back is back for the second one, which sets the same.
+    (
+        N,
+        [
+            "changes: [{ port_write: { port: m.speed, value: 0.7 } }], post_conf_state: [\"m:stopped\"]",
+            NOTHING,
+            STILL,
+            "changes: [{ port_write: { port: n.speed, value: 0.0 } }]",
+        ],
+        "fault('start m', 'slow', 1, 0.9)",
+        "slow 0.2 halt 0.3 stop 3",
+        "",
+    ),
+    // A switch of the group, or an undo, is interrupted: its way back does nothing again whose place was taken (what it had called is told
+    // when it is answered).
+    (
+        N,
+        [BRAKE, "changes: [{ port_write: { port: n.speed, value: 0.5 } }]", LIMIT, STILL],
+        "fault('port_write n.speed', 'slow', 1, 0.8)",
+        "slow 0.2 fast 0.05 stop 8",
+        "release",
+    ),
+    (
+        N,
+        [
+            "changes: [{ create: { component: k, type: Lamp } }, { operation_call: { operation: m.clamp } }]",
+            "changes: [{ port_write: { port: n.speed, value: 0.5 } }]",
+            LIMIT,
+            STILL,
+        ],
+        "fault('port_write n.speed', 'slow', 1, 0.5)",
+        "slow 0.2 fast 0.3 stop 3",
+        "unclamp",
+    ),
+    (
+        "create: { component: n, type: Motor } }, { create: { component: l, type: Lamp }",
+        ["post_conf_state: [\"l:running\"]", "changes: [{ port_write: { port: n.speed, value: 0.5 } }]", CLAMP, STILL],
+        "fault('port_write n.speed', 'slow', 1, 0.8)",
+        "slow 0.2 fast 0.05 stop 8",
+        "clamp unclamp",
+    ),
+    (
+        N,
+        [
+            "changes: [{ operation_call: { operation: m.clamp } }, { port_write: { port: m.speed, value: 0.4 } }]",
+            NOTHING,
+            OTHER,
+            STILL,
+        ],
+        "fault('port_write m.speed = 0.1', 'slow', 1, 0.8)",
+        "slow 0.2 off 0.1 stop 8",
+        "unclamp",
+    ),
+    (
+        "create: { component: n, type: Motor } }, { create: { component: l, type: Lamp }",
+        [
+            "changes: [{ operation_call: { operation: m.clamp } }], post_conf_state: [\"l:running\"]",
+            NOTHING,
+            OTHER,
+            STILL,
+        ],
+        "fault('operation_call m.unclamp', 'slow', 1, 0.8)",
+        "slow 0.2 off 0.1 stop 8",
+        "unclamp unclamp",
+    ),
+];
+
+/// Files of these: what is made beside the motor `m`, and `slow`, `fast`, `stop`, `halt`.
+fn arm(chart: &str, made: &str, [slow, fast, stop, halt]: &[&str; 4]) -> Demo {
+    let operations = "    operations:\n      brake:";
+    let limited = "    properties: { limit: { type: float, default: 0.5 } }\n    operations:\n      brake:";
+    let demo = Demo::new();
+    demo.write("deployment.yaml", &ARM.replace(operations, limited));
+    demo.write("k.yaml", chart);
+    let text = format!(
+        "configurations:
+  build: {{ changes: [{{ create: {{ component: m, type: Motor }} }}, {{ {made} }}] }}
+  run: {{ pre_conf_state: [\"m:stopped\"], changes: [{{ port_write: {{ port: m.speed, value: 0.1 }} }}], post_conf_state: [\"m:running\"] }}
+  slow: {{ group: speed, {slow} }}
+  fast: {{ group: speed, {fast} }}
+  stop: {{ safe: true, group: speed, {stop} }}
+  halt: {{ safe: true, group: speed, {halt} }}
+"
+    );
+    demo.write("c.yaml", &text);
+    demo
+}
+
+/// Two are asked for in one step, and the first one takes its time: what has not begun does not begin over what was made safe.
+#[test]
+fn what_stands_behind_what_is_interrupted_does_not_begin() {
+    let (letting, and) = ("entry: [stop.undo, halt.undo] }", "entry: [stop.undo, halt.undo, slow.undo, fast.undo] }");
+    let chart = chart().replace(letting, and).replace("        - { src: on, tgt: idle, events: [e_off] }\n", "");
+    let chart = chart.replace("on: { config: slow }, on2: { config: fast }", "on: { entry: [slow, fast] }, on2: {}");
+    let both = ["changes: [{ port_write: { port: n.speed, value: 0.4 } }]", LIMIT_OPEN, LIMIT, STILL];
+    let demo = arm(&chart, N, &both);
+    demo.replace("c.yaml", "fast: { group: speed, ", "fast: { ");
+    demo.write(
+        "s.lua",
+        "deploy('deployment.yaml') wait(0.2) fault('port_write n.speed', 'slow', 1, 0.3)
+         raise('e_slow') wait(0.1) raise('e_stop') wait(1) say('held ' .. property('m.limit'))
+         raise('e_reset') wait(1) say('over ' .. property('m.limit') .. ' ' .. #drift() .. ' ' .. #stack()) shutdown()",
+    );
+    let ran = demo.run(&["run", "s.lua", "--clock", "simulated"]);
+    let told: Vec<&str> = ran.out.lines().filter(|line| line.starts_with("held") || line.starts_with("over")).collect();
+    assert_eq!((told.as_slice(), ran.code), (&["held 0.1", "over 0.5 0 2"][..], 0), "{}{}", ran.out, ran.err);
+    assert!(ran.out.contains("slow.failed") && ran.out.contains("fast.cancelled"), "{}", ran.out);
+}
+
+/// Where the first one fails in part, what it has written stays while another one comes.
+#[test]
+fn what_is_made_safe_is_not_owed() {
+    let slow = "changes: [{ port_write: { port: m.speed, value: 0.4 } }]";
+    let stop = "changes: [{ port_write: { port: m.speed, value: 0.0 } }, { operation_call: { operation: m.brake } }]";
+    let demo = arm(&chart(), N, &[slow, NOTHING, stop, LIMIT]);
+    demo.write(
+        "s.lua",
+        "deploy('deployment.yaml') wait(0.2) fault('operation_call m.brake', 'fail', 1)
+
+         raise('e_slow') wait(0.2) raise('e_stop') wait(1) local at = port('m.speed') raise('e_halt')
+         for _ = 1, 20 do wait(0.05) if port('m.speed') ~= 0 then at = port('m.speed') end end say(at)
+         raise('e_reset') wait(1) say(port('m.speed') .. ' ' .. #stack()) shutdown()",
+    );
+    let ran = demo.run(&["run", "s.lua", "--clock", "simulated", "--quiet"]);
+    assert_eq!((ran.out.lines().collect::<Vec<_>>().as_slice(), ran.code), (&["0.0", "0.1 2"][..], 0), "{}", ran.err);
+}
+
+/// What is left of what it interrupts is repaired by its own undo, or on the way down: pressed twice, an emergency has nothing to do with that.
+#[test]
+fn what_is_left_of_what_it_interrupts_is_its_own_matter() {
+    let made = "create: { component: n, type: Motor } }, { create: { component: l, type: Lamp } }, { connect: { from: l.o, to: m.ref, policy: data }";
+    let slow = "changes: [{ disconnect: { from: l.o, to: m.ref } }, { operation_call: { operation: m.brake } }]";
+    for second in ["stop", "halt"] {
+        let demo = arm(&chart(), made, &[slow, NOTHING, OTHER, STILL]);
+        demo.write(
+            "s.lua",
+            &format!(
+                "deploy('deployment.yaml') wait(0.2) fault('operation_call m.brake', 'late', 1)
+                 raise('e_slow') wait(0.2) raise('e_stop') wait(2) raise('e_{second}') wait(8)
+                 raise('e_reset') wait(1) local at = stack()
+                 say(#at .. ' ' .. at[#at].configuration .. ' ' .. property('n.limit')) shutdown()"
+            ),
+        );
+        let ran = demo.run(&["run", "s.lua", "--clock", "simulated", "--quiet"]);
+        assert_eq!((ran.out.trim(), ran.code), ("3 slow 0.5", 0), "{second}: {}", ran.err);
+    }
+}
+
+#[test]
+fn an_emergency_ends_where_it_began() {
+    for (made, which, faults, events, calls) in CASES {
+        let demo = arm(&chart(), made, which);
+        let [slow, fast, stop, halt] = which;
+        let words: Vec<&str> = events.split(' ').collect();
+        let raised: String = words.chunks(2).map(|two| format!("raise('e_{}') wait({}) ", two[0], two[1])).collect();
+        let script = format!(
+            "local function same(a, b)
+               if type(a) ~= 'table' or type(b) ~= 'table' then return a == b end
+               for k, v in pairs(a) do if not same(v, b[k]) then return false end end
+               for k in pairs(b) do if a[k] == nil then return false end end
+               return true
+             end
+             deploy('deployment.yaml') wait(0.2) local before = system()
+             {faults} {raised}
+             raise('e_reset') wait(3) raise('e_reset') wait(1)
+             if #drift() > 0 then recover('back') wait(1) end
+             say(tostring(same(before, system())) .. ' ' .. #drift() .. ' ' .. #stack()) shutdown()"
+        );
+        demo.write("s.lua", &script);
+        let ran = demo.run(&["run", "s.lua", "--clock", "simulated", "--json"]);
+        let lines: Vec<serde_json::Value> =
+            ran.out.lines().filter_map(|line| serde_json::from_str(line).ok()).collect();
+        let case = format!("{made} {slow} {fast} {stop} {halt} {faults} {events}\n{}{}", ran.out, ran.err);
+        let end = lines.iter().position(|line| line["what"] == "said").unwrap_or_else(|| panic!("no end: {case}"));
+        assert_eq!((lines[end]["text"].as_str(), ran.code), (Some("true 0 2"), 0), "{case}");
+        let stopped = |line: &&serde_json::Value| {
+            line["what"] == "event" && matches!(line["event"].as_str(), Some("e_stop" | "e_halt"))
+        };
+        let since = lines.iter().find(stopped).and_then(|line| line["at"].as_f64()).expect("a safety event");
+        let answers =
+            lines[..end].iter().filter(|line| line["what"] == "answered" && line["at"].as_f64() >= Some(since));
+        let steps = answers.flat_map(|answer| answer["steps"].as_array().into_iter().flatten());
+        let called: Vec<&str> = steps
+            .filter(|step| step["outcome"] == "done")
+            .filter_map(|step| step["step"].as_str()?.trim_start_matches("undo: ").strip_prefix("operation_call m."))
+            .collect();
+        assert_eq!(called.join(" "), *calls, "{case}");
+    }
+}
