@@ -288,7 +288,7 @@ pub struct OperationType {
     /// Whether calling it moves hardware.
     pub moves: bool,
     /// What is true of the component once it was done: this settles a call of which no answer came. The component itself is
-    /// written [`SELF`](super::monitor::SELF) in it.
+    /// written `self` in it.
     #[serde(skip)]
     pub settled_by: Option<Condition>,
     /// What it does.

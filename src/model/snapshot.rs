@@ -82,7 +82,7 @@ pub struct ActivityStatus {
     /// How long a round took at most.
     #[serde(rename = "duration_max_s", serialize_with = "seconds")]
     pub duration_max: Duration,
-    /// The component whose update or operation has been running for longer than [`crate::limits::ACTIVITY_STUCK`].
+    /// The component whose update or operation has been running for longer than a second.
     pub stuck: Option<ComponentName>,
     /// What the operating system refused: a priority, a CPU.
     pub complaint: Option<String>,

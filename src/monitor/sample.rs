@@ -11,7 +11,7 @@ pub enum MonitorInput {
     /// A number in what a port carries (bools as 0 and 1). With an empty path, also ports that carry no number: then only
     /// when they were written matters.
     Port(PortSignal),
-    /// The run state of a component, as [`state_value`].
+    /// The run state of a component, as a number (`state_value`).
     State(ComponentName),
     /// Whether a component is faulted: 1 or 0.
     Faulted(ComponentName),
