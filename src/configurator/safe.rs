@@ -47,11 +47,12 @@ impl Engine {
         // What earlier safe ones will have done counts as done; but what both write only this one does.
         let was = self.earlier_safe(&request);
         let (mut earlier, comes_after) = (was.steps(), was.numbers.clone());
-        let mut stack = self.stack_with_earlier();
-        let begun = self.begun_to_be_taken_back(&mut stack);
-        let plan = |system: &System, earlier: &[Step]| {
-            effort(&with(system, earlier), &stack, configuration, &request, at, &self.given.context)
+        let whole = self.stack_with_earlier();
+        let (stack, begun) = self.begun_to_be_taken_back(&whole);
+        let plan_on = |system: &System, stack: &Stack, earlier: &[Step]| {
+            effort(&with(system, earlier), stack, configuration, &request, at, &self.given.context)
         };
+        let plan = |system: &System, earlier: &[Step]| plan_on(system, &stack, earlier);
         let BestEffort { mut planned, mut frame, troubles } = plan(&self.world.system, &earlier);
         // What is on its way to the platform may have come there or not: what this one wants is written either way.
         let mut out = self.values_out();
@@ -80,7 +81,7 @@ impl Engine {
         planned.steps.iter().for_each(|planned| touched.add(&planned.step));
         // The frame as it would be if what is interrupted had never been, and what is broken were as others had left it.
         let before = self.world.as_left_by_safe(before);
-        let frame = before.map_or(frame, |before| plan(&before, &earlier).frame);
+        let frame = before.map_or(frame, |before| plan_on(&before, &whole, &earlier).frame);
         frame.steps().iter().for_each(|planned| touched.add(&planned.step));
         for entry in configuration.pre.iter().chain(configuration.post.iter()) {
             if let Target::Component(component) = entry.target {
@@ -188,9 +189,9 @@ impl Engine {
         before.flat_map(|other| other.machine.still_to_do()).collect()
     }
 
-    /// Frames that what is interrupted had begun to take back: in the stack they have what is left of that to be done. What they were.
-    fn begun_to_be_taken_back(&self, stack: &mut Stack) -> Vec<Arc<Frame>> {
-        let mut begun = Vec::new();
+    /// The stack in which frames that what is interrupted had begun to take back have what is left of that to be done, and what these were.
+    fn begun_to_be_taken_back(&self, whole: &Stack) -> (Stack, Vec<Arc<Frame>>) {
+        let (mut stack, mut begun) = (whole.clone(), Vec::new());
         for running in self.running.iter().filter(|running| running.is_interrupted()) {
             let mut done: Vec<&Step> = running.machine.done_so_far().map(|(planned, _)| &planned.step).collect();
             for popped in running.machine.planned().popped.iter().filter(|popped| !popped.safe) {
@@ -201,7 +202,7 @@ impl Engine {
                 }
             }
         }
-        begun
+        (stack, begun)
     }
 
     /// Whether a safe configuration interrupts what is under way here: what claims something of its (sub)system, and whatever

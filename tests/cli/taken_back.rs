@@ -209,6 +209,14 @@ const CASES: &[Case] = &[
         "slow 0.2 fast 0.3 stop 3",
         "unclamp",
     ),
+    // What it does as well as the one that was being taken back is taken back by its end.
+    (
+        "create: { component: n, type: Motor } }, { create: { component: l, type: Lamp } }, { connect: { from: l.o, to: m.ref, policy: data }",
+        [APART, "changes: [{ port_write: { port: n.speed, value: 0.5 } }]", APART, STILL],
+        "fault('port_write n.speed', 'slow', 1, 0.5)",
+        "slow 0.2 fast 0.3 stop 3",
+        "",
+    ),
     (
         "create: { component: n, type: Motor } }, { create: { component: l, type: Lamp }",
         ["post_conf_state: [\"l:running\"]", "changes: [{ port_write: { port: n.speed, value: 0.5 } }]", CLAMP, STILL],
