@@ -1,4 +1,4 @@
-//! What is given as a file and is none: a pipe (`<(…)` of a shell), a terminal. It comes when it comes, and never if nobody writes.
+//! What is given as a file and is none: a named pipe, a terminal. It comes when it comes, and never if nobody writes.
 
 use std::fs::{File, OpenOptions};
 use std::io::{self, ErrorKind, Read};
