@@ -6,16 +6,33 @@
 
 use crate::model::monitor::is_monitors;
 use crate::model::{
-    Catalogue, ChangeKind, ComponentName, Deployment, Ident, MemberRef, OperatorMay, TypeName, Value, ValueType,
+    Catalogue, ChangeKind, ComponentName, Deployment, Ident, MemberRef, OperatorMay, Subsystem, TypeName, Value,
+    ValueType,
 };
 use crate::stack::contenders::may_hold;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Whether two files without subsystems are the same but for values.
+/// Whether two files, with their subsystems, are the same but for values.
 pub fn is_alike(one: &Deployment, other: &Deployment, catalogue: &Catalogue) -> bool {
-    if one.own.is_some() || other.own.is_some() {
-        return false;
-    }
+    let (own, theirs) = match (&one.own, &other.own) {
+        (None, None) => return is_alike_alone(one, other, catalogue),
+        (Some(own), Some(theirs)) => (own, theirs),
+        _ => return false,
+    };
+    let alone = |of: &Deployment| Deployment { subsystems: Vec::new(), ..of.clone() };
+    let same = |(one, other): (&Subsystem, &Subsystem)| {
+        (one.name, &one.file, &one.activities) == (other.name, &other.file, &other.activities)
+            && is_alike(&one.own, &other.own, &catalogue.known_in(one.name))
+    };
+    // Who gets in whose way over several files is looked at in each.
+    [one, other].into_iter().all(|of| nothing_is_held_twice(of, catalogue))
+        && own.subsystems.len() == theirs.subsystems.len()
+        && own.subsystems.iter().zip(&theirs.subsystems).all(same)
+        && is_alike_alone(&alone(own), &alone(theirs), catalogue)
+}
+
+/// Whether what two files have themselves is the same but for values.
+fn is_alike_alone(one: &Deployment, other: &Deployment, catalogue: &Catalogue) -> bool {
     let Some(mut pairs) = Pairs::new(one, catalogue) else { return false };
     pairs.fixed = asked_for(one, other, catalogue);
     let taken = defaults_taken(one, catalogue);

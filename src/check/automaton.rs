@@ -66,7 +66,6 @@ impl InterfaceAutomaton {
     }
 
     /// How many states it has.
-    #[cfg(test)]
     pub fn len(&self) -> usize {
         self.edges.len()
     }

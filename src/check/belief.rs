@@ -57,6 +57,10 @@ pub struct Beliefs {
     sets: IndexSet<(Belief, Repeated), FxBuildHasher>,
     tells: FxHashMap<u32, MayTell>,
     raised: FxHashMap<(u32, u8), (u32, bool)>,
+    /// Something was raised where so many events may lie in its inbox already that one more was not followed there.
+    filled: bool,
+    /// In which states of the automaton it tells nothing more by itself, though it is not down and nothing has failed.
+    rests: Vec<bool>,
 }
 
 impl Beliefs {
@@ -74,8 +78,23 @@ impl Beliefs {
         let (sets, tells, raised) = (IndexSet::default(), FxHashMap::default(), FxHashMap::default());
         let possible = IndexSet::default();
         let (silent, met, making) = (Vec::new(), Vec::new(), 0);
-        let mut beliefs =
-            Self { automaton, most_untaken, heard, takes, others, possible, silent, met, making, sets, tells, raised };
+        let rests = resting(&automaton, &heard, &others);
+        let mut beliefs = Self {
+            automaton,
+            most_untaken,
+            heard,
+            takes,
+            others,
+            possible,
+            silent,
+            met,
+            making,
+            sets,
+            tells,
+            raised,
+            filled: false,
+            rests,
+        };
         beliefs.of([(start, [0; MOST_UNTAKEN])], None);
         beliefs
     }
@@ -83,6 +102,21 @@ impl Beliefs {
     /// So many events lie in its inbox at once.
     pub fn most_untaken(&self) -> usize {
         self.most_untaken
+    }
+
+    /// Whether something was raised where its inbox may have been too full for that.
+    pub fn was_filled(&self) -> bool {
+        self.filled
+    }
+
+    /// Whether it is down, and has taken everything, wherever it may be.
+    pub fn is_down(&self, belief: u32) -> bool {
+        self.all_of(belief).all(|(state, untaken)| untaken[0] == 0 && self.automaton.state(state).down)
+    }
+
+    /// Whether it may be where it has taken everything, and tells nothing until something is raised for it.
+    pub fn may_rest(&self, belief: u32) -> bool {
+        self.all_of(belief).any(|(state, untaken)| untaken[0] == 0 && self.rests[state as usize])
     }
 
     /// What it may tell now.
@@ -115,6 +149,7 @@ impl Beliefs {
             return *known;
         }
         let before: Vec<Possible> = self.all_of(belief).collect();
+        self.filled |= before.iter().any(|(_, untaken)| untaken[MOST_UNTAKEN - 1] != 0);
         let repeated = self.sets[belief as usize].1;
         let times = repeated.filter(|(last, _)| *last == number).map_or(0, |(_, times)| times);
         let repeated = (self.most_untaken < MOST_UNTAKEN).then_some((number, times + 1));
@@ -225,6 +260,32 @@ impl Beliefs {
         }
         all
     }
+}
+
+/// The states in which nothing that is heard is told, nor in any that it gets to from there by itself, or by what `others` raise.
+fn resting(automaton: &InterfaceAutomaton, heard: &BTreeSet<EventName>, others: &BTreeSet<EventName>) -> Vec<bool> {
+    let mut tells = vec![false; automaton.len()];
+    let mut before: Vec<Vec<u32>> = vec![Vec::new(); automaton.len()];
+    let mut open: Vec<u32> = Vec::new();
+    for at in (0u32..).take(automaton.len()) {
+        for (by, to) in automaton.leads(at) {
+            match by {
+                InterfaceAction::Tells(event, _) if heard.contains(event) => open.push(at),
+                InterfaceAction::Takes { event, .. } if !others.contains(event) => {}
+                _ => before[*to as usize].push(at),
+            }
+        }
+    }
+    while let Some(at) = open.pop() {
+        if !std::mem::replace(&mut tells[at as usize], true) {
+            open.extend(&before[at as usize]);
+        }
+    }
+    let of = |(at, tells): (u32, bool)| {
+        let state = automaton.state(at);
+        !tells && !state.down && !state.failed
+    };
+    (0u32..).zip(tells).map(of).collect()
 }
 
 /// Whether an event is told where so much is still to be taken: that it is down is seen where it rests, and what lies before it then comes to

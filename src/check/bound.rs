@@ -1,5 +1,6 @@
 //! Bounds of what is followed, and what is said of those that cut something off.
 
+use super::belief::MOST_UNTAKEN;
 use super::effort::Effort;
 use super::state::Failed;
 use crate::limits;
@@ -72,6 +73,8 @@ pub enum Bound {
     Told,
     /// [`limits::CHECK_BELIEVED`]: the same.
     Forgotten,
+    /// [`MOST_UNTAKEN`](super::belief::MOST_UNTAKEN).
+    Untaken,
     /// [`limits::CHECK_DRIVEN`]: how long a way up or down lasts.
     Times,
     /// Times that count from when a coordinator began.
@@ -182,6 +185,7 @@ impl Bound {
             Self::Forgotten => {
                 format!("{TOLD}, for with that there are more than {} transitions (`--budget`)", effort.believed())
             }
+            Self::Untaken => format!("more than {MOST_UNTAKEN} events that a subsystem has not taken yet were not followed"),
             Self::Entered => "a coordinator could not be entered".to_owned(),
             Self::Clocked => "when times that count from the beginning of the coordinator (`e_at`) are over was not followed: at once, each time \
                               that such a state is entered late, or later than there is time for (`e_after` counts from the state)"

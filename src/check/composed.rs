@@ -43,14 +43,17 @@ where
         let around = Neighbours { parent, stands_for, ..Neighbours::default() };
         run(with_limits_of(&whole, &file.first.own), &local, &around, one)
     };
-    let mut checked = side_by_side::each(&files, |file| check(file, &file.all, file.like.is_some()));
+    // Of what stands for another one, that one's subsystems tell.
+    let stands_for = around.stands_for;
+    let mut checked = side_by_side::each(&files, |file| check(file, &file.all, stands_for || file.like.is_some()));
     for (at, file) in files.iter().enumerate() {
         // Of one that is refused for its values nothing was followed.
         if file.like.is_some_and(|like| checked[like].0.verdict == CheckVerdict::Refused) {
-            checked[at] = check(file, &[file.first], false);
+            checked[at] = check(file, &[file.first], stands_for);
         }
     }
-    let mut around = Neighbours { parent: around.parent.clone(), ..Neighbours::default() };
+    let mut around = Neighbours { parent: around.parent.clone(), stands_for, ..Neighbours::default() };
+    around.alike = files.iter().map(|file| file.all.iter().map(|subsystem| subsystem.name).collect()).collect();
     let mut reports: Vec<(Vec<Ident>, Report)> = Vec::new();
     for (file, (report, shows)) in files.into_iter().zip(checked) {
         // What is refused is not run: what it might tell is not worth following.
@@ -86,14 +89,14 @@ where
             report.traces.push(way);
         }
     }
-    if whole.subsystems.iter().any(|subsystem| subsystem.own.charts().any(is_timed)) {
+    if !stands_for && whole.subsystems.iter().any(|subsystem| subsystem.own.charts().any(is_timed)) {
         let what =
             "whether ways down through several files are in time, but for that from where all is up, was not followed";
         report.left.push(what.to_owned());
         report.explored.complete = false;
     }
     reports.push((Vec::new(), report));
-    (put_together(whole, reports), shows)
+    (put_together(whole, reports, stands_for), shows)
 }
 
 /// Whether something of a coordinator takes time.
@@ -247,8 +250,8 @@ fn some_value(ty: &ValueType) -> Value {
     }
 }
 
-/// One report of all.
-fn put_together(whole: Arc<Deployment>, reports: Vec<(Vec<Ident>, Report)>) -> Report {
+/// One report of all. `stands_for`: what was left out is told of another one.
+fn put_together(whole: Arc<Deployment>, reports: Vec<(Vec<Ident>, Report)>, stands_for: bool) -> Report {
     let mut all: Vec<(Finding, Vec<TraceStep>)> = Vec::new();
     let mut explored = Explored { complete: true, without_failure: true, ..Explored::default() };
     let mut left: BTreeSet<String> = BTreeSet::new();
@@ -280,7 +283,7 @@ fn put_together(whole: Arc<Deployment>, reports: Vec<(Vec<Ident>, Report)>) -> R
         told.extend(found.iter().map(|(finding, _)| (finding.clone(), own.clone())));
         all.extend(found.into_iter().map(|(finding, way)| (within(finding, path), alone(way, path))));
     }
-    if whole.own_part().configurations.iter().any(|configuration| configuration.safe) {
+    if !stands_for && whole.own_part().configurations.iter().any(|configuration| configuration.safe) {
         left.insert("what a safe configuration interrupts in subsystems is not followed there".to_owned());
         explored.complete = false;
     }

@@ -56,6 +56,11 @@ impl Deeper {
         true
     }
 
+    /// Whether all there is behind an undo that failed was more than is looked at.
+    pub fn was_too_much_behind(&self) -> bool {
+        self.too_much.contains(&More::Behind)
+    }
+
     /// Whether it is to be followed anew with something more; else this is what is known of it.
     pub fn goes_on(&mut self, graph: &mut Graph<'_, '_>) -> bool {
         if graph.is_cut_off() {

@@ -37,6 +37,7 @@ impl Graph<'_, '_> {
         let stuck = self.stuck(&mut found);
         self.leftovers(&mut found);
         self.ways_down(&stuck, &mut found);
+        self.waits_in_vain(&mut found);
         self.down_behind_safe(&mut found);
         self.safety(&mut found);
         self.warned(&mut found);

@@ -51,6 +51,12 @@ impl<'a> Product<'a> {
         known.any(|beliefs| beliefs.most_untaken() < MOST_UNTAKEN)
     }
 
+    /// Whether more was raised for one of them than is followed before it takes it.
+    pub(super) fn fills_children(&self) -> bool {
+        let mut known = self.children.iter().filter_map(|child| child.beliefs.as_ref());
+        known.any(Beliefs::was_filled)
+    }
+
     /// From now on they may tell anything in any order.
     pub(super) fn forget_children(&mut self) {
         self.children.iter_mut().for_each(|child| child.beliefs = None);

@@ -27,6 +27,8 @@ pub struct Neighbours {
     pub parent: Option<ParentInterface>,
     /// What its subsystems show, by their names. One that is not here may tell anything in any order.
     pub children: BTreeMap<Ident, Arc<InterfaceAutomaton>>,
+    /// Subsystems that are the same but for values.
+    pub alike: Vec<Vec<Ident>>,
     /// Another file that is the same but for values is followed.
     pub stands_for: bool,
 }

@@ -38,6 +38,12 @@ fn raised_anew(state: &mut ProductState, at: usize, begins: bool, ends: bool) {
     }
 }
 
+/// Whether a subsystem can be nowhere but down, by what is known of it.
+fn is_known_down(child: &Child, state: &ProductState, at: usize) -> bool {
+    let belief = state.beliefs.get(at).copied().unwrap_or_default();
+    child.beliefs.as_ref().is_some_and(|beliefs| beliefs.is_down(belief))
+}
+
 impl Product<'_> {
     /// An event is heard, or would be if anybody waited for it: it may tell how a subsystem stands.
     pub(super) fn hears_of_child(&self, state: &mut ProductState, name: EventName) {
@@ -47,7 +53,10 @@ impl Product<'_> {
                 if state.children & released(at) == 0 {
                     state.children |= promised(at);
                 }
-            } else if name == child.down || child.is_down_by(name) && (child.deaf.is_none() || is_over(state, at)) {
+            } else if name == child.down
+                || child.is_down_by(name) && (child.deaf.is_none() || is_over(state, at))
+                || name.local(child.path).is_some() && is_known_down(child, state, at)
+            {
                 state.children &= !(promised(at) | begun(at) | released(at));
             }
         }
@@ -190,6 +199,13 @@ impl Graph<'_, '_> {
                 help += &format!(
                     "; `{ignored}` does not say that it is down, for it ignores that in `{deaf}` as well: hear `{}` there too",
                     of.ends.local(of.path).unwrap_or_default()
+                );
+            }
+            if of.beliefs.is_none() {
+                help += &format!(
+                    "; in which order `{}` tells things is not known here, so it may be that it never comes to that: where it and its parent have fewer states, \
+                     that is followed (`--budget` gives room for more)",
+                    of.path
                 );
             }
             let place = self.product.worlds.configuration(id).map(|c| c.origin).unwrap_or_default();

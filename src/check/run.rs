@@ -6,6 +6,7 @@ use super::bound::Bound;
 use super::deeper::Deeper;
 use super::driven::DrivenPorts;
 use super::effort::Effort;
+use super::exchanged::Exchanging;
 use super::explore::explore;
 use super::judge::Traced;
 use super::neighbours::Neighbours;
@@ -19,6 +20,7 @@ use super::{
     unhandled, universe, unwatched, ways,
 };
 use crate::model::codes::{CLASH, COORD_NO_WAY_DOWN, POST_ON_DESTROYED, PRE_ON_CREATED, TOUCHES_DESTROYED};
+use crate::model::naming::Naming;
 use crate::model::{
     Catalogue, Code, ConfigId, Deployment, EventName, Finding, Findings, MemberRef, Severity, StepFault,
 };
@@ -202,7 +204,18 @@ fn follow(
         left.insert(Bound::Tied.told(Failed::Nothing, 0, &effort));
         explored.complete = false;
     }
+    let exchanging = Exchanging { deployment, charts, catalogue, around };
+    let mut clean: Vec<(Vec<usize>, FxHashSet<ConfigId>, bool)> = Vec::new();
     for numbers in groups {
+        // What is found on one is told of that one: only where there is nothing does it stand for another one.
+        let like = clean.iter().find_map(|one| Some((one, exchanging.between(&one.0, &numbers)?)));
+        if let Some(((_, ids, verified), exchange)) = like {
+            asked.extend(ids.iter().map(|id| exchange.id(*id)));
+            let shared = coupling::shared(deployment, charts, &numbers, *verified);
+            found.extend(shared.into_iter().map(|finding| (finding, Vec::new())));
+            continue;
+        }
+        let before = found.len();
         // Where all have to do with each other, what was planned for the ways is known already.
         let mut apart = (numbers != all).then(|| Product::new(deployment, views, charts, &numbers, catalogue));
         if let Some(apart) = &mut apart {
@@ -250,6 +263,9 @@ fn follow(
             if graph.product.knows_no_order() {
                 graph.cut(if forgotten { Bound::Forgotten } else { Bound::Told }, Failed::Nothing);
             }
+            if graph.product.fills_children() {
+                graph.cut(Bound::Untaken, Failed::Nothing);
+            }
             if graph.product.waits_for_others() {
                 graph.cut(Bound::Anew, Failed::Nothing);
             }
@@ -268,11 +284,21 @@ fn follow(
             found.extend(graph.judge());
             graph.probe(&found);
             let verified = !graph.is_cut_off();
+            if found.len() == before {
+                clean.push((numbers.clone(), graph.product.worlds.asked().clone(), verified));
+            }
             let shared = coupling::shared(deployment, charts, &numbers, verified);
             found.extend(shared.into_iter().map(|finding| (finding, Vec::new())));
-            left.extend(
-                graph.bounds.iter().map(|(bound, failed)| bound.told(*failed, graph.product.most_waiting, &effort)),
-            );
+            let told = |(bound, failed): (&Bound, &Failed)| {
+                let told = bound.told(*failed, graph.product.most_waiting, &effort);
+                match *bound == Bound::Lean && deeper.was_too_much_behind() {
+                    true => {
+                        format!("{told}: with that there are more than {} transitions (`--budget`)", effort.transitions)
+                    }
+                    false => told,
+                }
+            };
+            left.extend(graph.bounds.iter().map(told));
             explored = explored.and(graph.explored());
             if let Some(parent) = around.parent.as_ref().filter(|_| numbers == all && verified && pure) {
                 shows = graph.derived(parent).map(Arc::new);

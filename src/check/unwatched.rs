@@ -9,8 +9,8 @@ use super::universe::Universe;
 use crate::model::codes::DEPLOY_UNWATCHED;
 use crate::model::monitor::is_monitors;
 use crate::model::{
-    ChangeKind, ComponentName, ComponentType, Deployment, Direction, EventName, FAULTED, Finding, Findings, MemberRef,
-    Origin, PortType, RunState, Target, ValueType,
+    ChangeKind, ComponentName, ComponentType, Deployment, Direction, EventName, FAULTED, Finding, Findings, Ident,
+    MemberRef, Origin, PortType, RunState, Target, ValueType,
 };
 use crate::statechart::Chart;
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -28,7 +28,7 @@ pub fn check(deployment: &Deployment, universe: &Universe, charts: &[&Chart]) ->
     };
     let mut names: Vec<ComponentName> = universe.components().filter(missed).collect();
     names.sort_unstable_by_key(ComponentName::as_str);
-    let missed = names.into_iter().filter(|name| !look.is_fault_heard(*name));
+    let missed = names.into_iter().filter(|name| !look.is_fault_heard(*name) && !look.is_watched_inside(*name));
     missed
         .filter_map(|name| {
             let why = if let Some((_, at)) = read.iter().find(|(read, _)| *read == name) {
@@ -61,7 +61,14 @@ impl Look<'_> {
         let sends = |port: &PortType| port.direction == Direction::Out && port.ty != ValueType::Event;
         let port = self.types(name).flat_map(|ty| &ty.ports).find(|(_, port)| sends(port));
         let port = port.map(|(port, _)| name.member(*port));
-        let fault = format!("let a transition hear `{name}.faulted`");
+        let within = self.within(name);
+        let fault = match within {
+            // What happens to it is heard there, and nowhere else.
+            Some((path, own)) => format!("let a transition of `{path}`, in its own file, hear `{own}.faulted`"),
+            None => format!("let a transition hear `{name}.faulted`"),
+        };
+        // It may be read by the name by which it is exported.
+        let port = port.map(|port| self.exported_as(port).unwrap_or_else(|| port.to_string()));
         let help = match port {
             // Of its own death it tells nothing.
             _ if self.is(name, |ty| is_monitors(ty.name)) => format!(
@@ -108,6 +115,31 @@ impl Look<'_> {
     fn is_fault_heard(&self, name: ComponentName) -> bool {
         let Ok(event) = EventName::new(&format!("{name}{FAULTED}")) else { return false };
         self.hears(event)
+    }
+
+    /// The subsystem that a component is in, and its name there.
+    fn within(&self, name: ComponentName) -> Option<(Ident, &'static str)> {
+        self.deployment.subsystems.iter().find_map(|of| Some((of.name, name.local(of.name)?)))
+    }
+
+    fn exported_as(&self, port: MemberRef) -> Option<String> {
+        self.deployment.subsystems.iter().find_map(|of| {
+            let mut exports = of.own.interface.exports.iter();
+            let is =
+                |of_it: MemberRef| of_it.component.within(of.name) == port.component && of_it.member == port.member;
+            exports.find(|(_, export)| is(export.of)).map(|(alias, _)| format!("{}.{alias}", of.name))
+        })
+    }
+
+    /// Whether it is in a subsystem in which its fault is heard, or a monitor reads it: that one tells how it stands.
+    fn is_watched_inside(&self, name: ComponentName) -> bool {
+        let Some((path, own)) = self.within(name) else { return false };
+        let Some(inside) = self.deployment.subsystems.iter().find(|of| of.name == path) else { return false };
+        let mut read = false;
+        for monitor in &inside.own.monitors {
+            monitor.when.for_each_component(&mut |component, _| read |= component.as_str() == own);
+        }
+        read || inside.own.charts().any(|chart| chart.waits_for(&format!("{own}{FAULTED}")))
     }
 
     fn hears(&self, event: EventName) -> bool {

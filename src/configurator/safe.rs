@@ -7,8 +7,8 @@ use super::engine::Engine;
 use super::request::{Reason, Request};
 use super::running::{Purpose, Running};
 use super::safety::{Troubled, coming};
-use crate::model::{Ask, ConfigId, RequestId, Snapshot, Step, Target, Verdict};
-use crate::stack::{BestEffort, Frame, Planned, Residual, SafeEnd, Stack, components, effort};
+use crate::model::{Ask, ConfigId, Configuration, RequestId, Snapshot, Step, Target, Verdict};
+use crate::stack::{BestEffort, Frame, Planned, Residual, SafeEnd, Stack, but_for_what_is_so, components, effort};
 use crate::system::touch::{Slot, slot};
 use crate::system::{System, step, touch};
 use crate::transaction::{BrokenPart, Input, OpenStep, PartEnd, Spec, Touched, Transaction};
@@ -49,10 +49,16 @@ impl Engine {
         let (mut earlier, comes_after) = (was.steps(), was.numbers.clone());
         let whole = self.stack_with_earlier();
         let (stack, begun) = self.begun_to_be_taken_back(&whole);
-        let plan_on = |system: &System, stack: &Stack, earlier: &[Step]| {
-            effort(&with(system, earlier), stack, configuration, &request, at, &self.given.context)
+        let plan_on = |what: &Configuration, system: &System, stack: &Stack, earlier: &[Step]| {
+            effort(&with(system, earlier), stack, what, &request, at, &self.given.context)
         };
-        let plan = |system: &System, earlier: &[Step]| plan_on(system, &stack, earlier);
+        // The frame as it would be if what is interrupted had never been, and what is broken were as others had left it.
+        let before = self.world.as_left_by_safe(before);
+        let own =
+            |earlier: &[Step]| before.as_ref().map(|before| plan_on(configuration, before, &whole, earlier).frame);
+        let rest = own(&earlier).map(|own| but_for_what_is_so(configuration, &own, &self.world.system));
+        let rest = rest.as_deref().unwrap_or(configuration);
+        let plan = |system: &System, earlier: &[Step]| plan_on(rest, system, &stack, earlier);
         let BestEffort { mut planned, mut frame, troubles } = plan(&self.world.system, &earlier);
         // What is on its way to the platform may have come there or not: what this one wants is written either way.
         let mut out = self.values_out();
@@ -75,13 +81,22 @@ impl Engine {
             planned = plan(&here, &left.steps()).planned;
             // What it does in the place of one that it takes over its own frame tells, since nothing of that one may be left.
             earlier = was.but_for_what_is_taken(&left);
+            let gone: Vec<Slot> =
+                was.counted.iter().filter(|one| !left.counted.contains(one)).map(|one| slot(&one.0)).collect();
+            for other in &mut self.running {
+                if let Purpose::Safe(safe) = &mut other.purpose {
+                    // Those between found it written so, as they were planned: it never was, and there is nothing that they would give back.
+                    safe.1.saved.retain(|saved| saved.step || !gone.contains(&saved.slot));
+                }
+            }
+        }
+        if yields || !was.underlies.is_empty() {
+            earlier.extend(was.underlies.iter().cloned());
             frame = plan(&self.world.system, &earlier).frame;
         }
         let mut touched = Touched::default();
         planned.steps.iter().for_each(|planned| touched.add(&planned.step));
-        // The frame as it would be if what is interrupted had never been, and what is broken were as others had left it.
-        let before = self.world.as_left_by_safe(before);
-        let frame = before.map_or(frame, |before| plan_on(&before, &whole, &earlier).frame);
+        let frame = own(&earlier).unwrap_or(frame);
         frame.steps().iter().for_each(|planned| touched.add(&planned.step));
         for entry in configuration.pre.iter().chain(configuration.post.iter()) {
             if let Target::Component(component) = entry.target {
@@ -121,10 +136,14 @@ impl Engine {
                 for open in other.machine.still_to_do() {
                     // What it only takes back of others is so for whoever comes, whoever does it.
                     let own = anew && brings_about(&safe.1, &open.step);
-                    match own && open.begun {
-                        true => earlier.unknown.push(open.step),
-                        false => earlier.counted.push((open.step, own)),
+                    if !(own && open.begun) {
+                        earlier.counted.push((open.step, own));
+                        continue;
                     }
+                    if matches!(open.step, Step::State { .. }) && !does(&safe.1, &open.step) {
+                        earlier.underlies.push(open.step.clone());
+                    }
+                    earlier.unknown.push(open.step);
                 }
                 earlier.numbers.push(other.number);
             }
@@ -376,6 +395,8 @@ struct Earlier {
     /// Values, run states and connections that are out, of one whose place is taken: nobody knows yet whether they come to be, and they are done once more. What
     /// that one itself takes the place of is taken back by it all the same.
     unknown: Vec<Step>,
+    /// Those of them that its frame does not tell of, as it also takes others back with them: the frame goes on from there, as that one's does.
+    underlies: Vec<Step>,
     /// Who.
     numbers: SmallVec<[u64; 1]>,
 }
@@ -404,8 +425,13 @@ fn brings_about(frame: &Frame, step: &Step) -> bool {
         Step::State { component, .. } => frame.moved(*component).is_some(),
         Step::PropertySet { .. } | Step::PortWrite { .. } => frame.saved.iter().any(|saved| saved.slot == slot(step)),
         Step::Operation(_) => false,
-        _ => frame.steps().iter().any(|planned| planned.step == *step),
+        _ => does(frame, step),
     }
+}
+
+/// Whether this is one of a frame's own steps.
+fn does(frame: &Frame, step: &Step) -> bool {
+    frame.steps().iter().any(|planned| planned.step == *step)
 }
 
 /// A system in which these steps are done.

@@ -1,6 +1,7 @@
 //! From a machine's Lua tables to the model's statechart, with its functions in a list.
 
 use crate::limits;
+use crate::model::naming::Naming;
 use crate::model::statechart::{
     Action, ChartNode, ChartTransition, Connector, FunctionId, Since, State, Statechart, TimeEvent, Trigger,
 };

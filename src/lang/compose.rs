@@ -5,6 +5,7 @@ use crate::model::condition_walk::Looked;
 use crate::model::configuration::NameInChange;
 use crate::model::finding::{did_you_mean, nearest};
 use crate::model::monitor::Condition;
+use crate::model::naming::Naming;
 use crate::model::within::Within;
 use crate::model::{
     ComponentName, Configuration, Deployment, Finding, Ident, MemberClass, MemberRef, OperatorMay, Origin, Subsystem,

@@ -89,12 +89,11 @@ impl DeploymentReader<'_> {
             Kind::Map(entries) => entries.first().map_or(reading.whole, |e: &Entry| e.origin),
             _ => reading.whole,
         };
-        let draft = deployment_file::draft(cx, node, &stem(path))?;
+        let mut draft = deployment_file::draft(cx, node, &stem(path))?;
         let folder = path.parent().map_or_else(PathBuf::new, Path::to_path_buf);
-        let subsystems = self.subsystems(cx, &folder, draft.subsystems, (&part.within, set))?;
         let inner = |path: &str| {
             let first = path.split_once('.').map(|(first, _)| first);
-            subsystems.iter().any(|subsystem| first == Some(subsystem.name.as_str()))
+            draft.subsystems.iter().any(|subsystem| first == Some(subsystem.name.as_str()))
         };
         let declared = &draft.deployment.interface.parameters;
         let (mut given, mut others) = (part.given, Vec::new());
@@ -110,7 +109,10 @@ impl DeploymentReader<'_> {
         }
         let mut with = draft.with;
         let at = if part.at.is_some() { part.at } else { origin };
-        for entry in interface::given(cx, (declared, &draft.ill), given, (&part.of, &part.within), at) {
+        let own = interface::given(cx, (declared, &draft.ill), given, (&part.of, &part.within), at);
+        let handed = interface::hand_down(cx, &mut draft.subsystems, &own);
+        let subsystems = self.subsystems(cx, &folder, draft.subsystems, (&part.within, set))?;
+        for entry in own {
             if let Some(twice) = with.iter().find(|other| other.key == entry.key) {
                 let message = format!("`{}` is a parameter, and given under `with` too", entry.key);
                 let finding = Finding::error(codes::TEXT_DUPLICATE_KEY, message).at(twice.origin);
@@ -121,6 +123,7 @@ impl DeploymentReader<'_> {
         }
         let names = subsystems.iter().map(|subsystem| subsystem.name).collect();
         let mut params = Params::of(cx, SetPlace { within: part.within, subsystems: names }, with, &others);
+        params.all.iter_mut().for_each(|param| param.used |= handed.contains(&param.name));
         let mut configurations = Vec::new();
         for (file, named_at) in &draft.configurations {
             if let Some(node) = configuration_tree(cx, from, &folder.join(file), *named_at, &mut params) {

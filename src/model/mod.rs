@@ -12,6 +12,7 @@ pub mod functions;
 pub mod injection;
 pub mod monitor;
 pub mod names;
+pub mod naming;
 pub mod outcome;
 pub mod outline;
 pub mod pattern;

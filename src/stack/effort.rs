@@ -6,12 +6,11 @@
 use super::net;
 use super::share::{self, HandOver, shares};
 use super::squash::{list, squash};
+use super::there::of_what_is_there;
 use super::void::rest;
 use super::work::{Op, Part, Planned, transaction};
 use super::{Edits, Frame, FrameId, Inverse, Reason, Request, Stack};
-use crate::model::{
-    Change, ChangeKind, ComponentName, Configuration, RunState, StateEntry, StateList, Step, Target, Transition, codes,
-};
+use crate::model::{Change, ChangeKind, ComponentName, Configuration, RunState, StateList, Step, Transition, codes};
 use crate::plan::footprint::{Footprint, Slot};
 use crate::plan::undo::{DraftStep, absolute, items};
 use crate::plan::{PlanContext, PlannedStep, plan_on};
@@ -42,9 +41,6 @@ pub fn effort(
     at: Time,
     context: &PlanContext,
 ) -> BestEffort {
-    // What concerns a component that is not there has nothing to be made safe.
-    let there = of_what_is_there(system, configuration);
-    let configuration = &*there;
     on_top(system, stack, configuration, request, (at, context))
         .or_else(|| whole(system, stack, configuration, request, (at, context)))
         .unwrap_or_else(|| piecewise(system, configuration, request, at, context))
@@ -134,6 +130,30 @@ fn beside(steps: &mut [PlannedStep]) {
     net::components_side_by_side(steps);
 }
 
+/// A safe configuration without the acts that its `frame` tells of, and that are so in the `system` already: what it interrupts has done them, and leaves
+/// them to it.
+pub fn but_for_what_is_so<'c>(
+    configuration: &'c Configuration,
+    frame: &Frame,
+    system: &System,
+) -> Cow<'c, Configuration> {
+    let is_own = |act: &ChangeKind| {
+        frame.steps().iter().any(|planned| match (&planned.step, act) {
+            (Step::Create { component, .. }, ChangeKind::Create { component: of, .. }) => component == of,
+            (Step::Connect { from, to, .. }, ChangeKind::Connect { from: a, to: b, .. })
+            | (Step::Disconnect { from, to }, ChangeKind::Disconnect { from: a, to: b }) => (from, to) == (a, b),
+            _ => false,
+        })
+    };
+    let is_so = |change: &Change| is_done(&change.kind, system) && is_own(&change.kind);
+    if !configuration.changes.iter().any(is_so) {
+        return Cow::Borrowed(configuration);
+    }
+    let mut rest = configuration.clone();
+    rest.changes.retain(|change| !is_so(change));
+    Cow::Owned(rest)
+}
+
 /// Whether an act that would be refused is so already.
 fn is_done(act: &ChangeKind, system: &System) -> bool {
     match act {
@@ -144,27 +164,6 @@ fn is_done(act: &ChangeKind, system: &System) -> bool {
         ChangeKind::Disconnect { from, to } => system.link(*from, *to).is_none(),
         _ => false,
     }
-}
-
-/// A configuration without what is about components that are not there.
-fn of_what_is_there<'c>(system: &System, configuration: &'c Configuration) -> Cow<'c, Configuration> {
-    let created = |component: &ComponentName| {
-        let makes =
-            |change: &Change| matches!(&change.kind, ChangeKind::Create { component: of, .. } if of == component);
-        configuration.changes.iter().any(makes)
-    };
-    let there = |component: &ComponentName| system.component(*component).is_some() || created(component);
-    let entry = |entry: &StateEntry| !matches!(&entry.target, Target::Component(of) if !there(of));
-    let list = |of: &StateList| StateList::of(of.iter().filter(entry)).unwrap_or_default();
-    let change = |change: &Change| change.kind.components().iter().all(there);
-    let states = || configuration.pre.iter().chain(configuration.post.iter());
-    if configuration.changes.iter().all(change) && states().all(|one| entry(&one)) {
-        return Cow::Borrowed(configuration);
-    }
-    let mut rest = configuration.clone();
-    rest.changes.retain(change);
-    (rest.pre, rest.post) = (list(&configuration.pre), list(&configuration.post));
-    Cow::Owned(rest)
 }
 
 /// The frame of a safe configuration of a group takes the others of that group over that are still there: it did not find them yet when it
@@ -337,6 +336,18 @@ pub(super) fn owed_no_more(
     (if kept == before { frame } else { Frame { inverse: Inverse::List(Arc::new(kept)), ..frame } }, made_up)
 }
 
+/// The frame of an earlier safe configuration without what a later one was to do in its place, and did not: nobody has. None: it has nothing of that.
+pub(super) fn but_for_missed(frame: &Frame, missed: &[Step]) -> Option<Frame> {
+    let mut left = list(frame);
+    let before = left.len();
+    for step in missed.iter().filter(|step| absolute(step).is_none() && !matches!(step, Step::Operation(_))) {
+        if let Some(at) = left.iter().position(|item| undoes(item, step)) {
+            left.remove(at);
+        }
+    }
+    (left.len() < before).then(|| Frame { inverse: Inverse::List(Arc::new(left)), ..frame.clone() })
+}
+
 /// Whether an item leads back from a step.
 fn undoes(item: &DraftStep, step: &Step) -> bool {
     match (step, &item.step) {
@@ -373,6 +384,7 @@ fn piecewise(
     at: Time,
     context: &PlanContext,
 ) -> BestEffort {
+    let configuration = &*of_what_is_there(system, configuration);
     let mut view = Overlay::new(system);
     let mut steps: Vec<PlannedStep> = Vec::new();
     let mut troubles = Vec::new();

@@ -31,6 +31,7 @@ mod stands;
 mod still;
 #[cfg(test)]
 mod tests;
+mod there;
 mod void;
 mod work;
 mod world;
@@ -38,7 +39,7 @@ mod world;
 pub use answer::{Answer, Reason, Residual, TakenAlong};
 pub use batch::{Group, Rules, Told, held, may_apply, take_up};
 pub use desk::{ActiveBatch, Arrival, Arrived, Desk, GivenUp, Gone, given_up_of};
-pub use effort::{BestEffort, effort};
+pub use effort::{BestEffort, but_for_what_is_so, effort};
 pub use keep::keeps_still;
 pub use leave::Barring;
 pub use net::reduce;

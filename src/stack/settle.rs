@@ -3,12 +3,13 @@
 //! The parts of a group end in order: those before one that failed stand, and what stands behind it is taken up anew, since
 //! it was decided for a system in which that one is done. Where a safe configuration interrupts a group all of it ends.
 
-use super::effort::{owed_no_more, without};
+use super::effort::{but_for_missed, owed_no_more, without};
 use super::squash::list;
 use super::{Edits, Frame, FrameId, Group, Request, Why, World};
 use crate::model::{Ask, Step, Verdict};
 use crate::plan::undo::DraftStep;
 use smallvec::SmallVec;
+use std::sync::Arc;
 
 /// How a part of a group has ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -161,6 +162,12 @@ impl World {
             // also where something else was under way, and about that itself: else that would seem to be in force, whatever was left of it.
             busy.retain(|frame| edits.pops.iter().all(|(id, _)| id != frame));
             others.extend(edits.pops.drain(..).map(|(id, _)| id));
+        }
+        let taken = |of: &&Arc<Frame>| {
+            of.safe && of.group.is_some() && of.group == frame.group && of.foreign_to(frame.requester).is_none()
+        };
+        for earlier in self.stack.frames().iter().filter(taken).cloned().collect::<Vec<_>>() {
+            but_for_missed(&earlier, end.missed).into_iter().for_each(|rest| self.stack.replace(rest));
         }
         let frame = match end.failed {
             None if end.missed.is_empty() => frame,

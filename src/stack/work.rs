@@ -357,6 +357,7 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
         if let Some(group) = configuration.group {
             self.replace(group, configuration, requester, edits)?;
         }
+        let configuration = &*super::there::of_what_is_there(self.script.view(), configuration);
         let first = self.parts.is_empty() && !self.replaced && self.script.steps.is_empty();
         let pushes = self.known.filter(|_| first);
         let known = pushes.and_then(|pushes| pushes.known(configuration.id));
@@ -366,8 +367,7 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
             pushes.into_iter().for_each(|pushes| pushes.note(configuration.id, &planned));
             planned
         });
-        let PlannedPush { steps, footprint, saved, floor, warnings } =
-            planned.as_ref().as_ref().map_err(Refusal::clone)?;
+        let PlannedPush { steps, footprint, saved, floor, warnings } = (*planned).as_ref().map_err(Refusal::clone)?;
         self.warnings.extend(warnings.iter().cloned());
         let destroyed = steps.iter().filter_map(|planned| match planned.step {
             Step::Destroy { component } => Some(component),

@@ -264,12 +264,14 @@ impl Transaction {
     }
 
     /// Whether a step stays: a call, whoever made it, since safe configurations that are in force, or that these were touched by, have made it too;
-    /// and what takes back a frame whose place they have taken, or that would come back.
+    /// and what takes back a frame whose place they have taken, or that would come back, unless they want it otherwise themselves.
     fn is_kept(&self, step: &Step, touched: &Touched) -> bool {
         let kept = |of| self.planned.kept.contains(of) || touched.calls.contains(of);
         let pops = |id: FrameId| self.planned.popped.iter().any(|popped| popped.id == id);
         matches!(step, Step::Operation(call) if kept(&call.operation))
-            || absolute(step).is_none() && touched.gone.iter().any(|(id, of)| of == step && pops(*id))
+            || absolute(step).is_none()
+                && !touched.opposes(step)
+                && touched.gone.iter().any(|(id, of)| of == step && pops(*id))
     }
 
     /// The steps that are still to be done to take a step of the forward list back.

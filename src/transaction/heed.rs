@@ -97,7 +97,8 @@ impl<'t> Heed<'t> {
     /// A way back that begins; it takes away again what `made` has made.
     pub fn new<'s>(touched: &'t Touched, made: impl Iterator<Item = &'s Step>) -> Self {
         let created = made.filter_map(|step| match step {
-            Step::Create { component, .. } => Some(*component),
+            // What they have made as well stays, until their own end.
+            Step::Create { component, .. } => Some(*component).filter(|of| touched.wants_there(*of) != Some(true)),
             _ => None,
         });
         let doomed = if touched.is_empty() { FxHashSet::default() } else { created.collect() };
@@ -128,7 +129,8 @@ impl<'t> Heed<'t> {
         let missing = |component: &ComponentName| view.component(*component).is_none();
         match back {
             Step::Create { component, ty, activity, properties } => {
-                if !missing(component) {
+                // What they have destroyed as well their own end makes again.
+                if !missing(component) || self.touched.wants_there(*component) == Some(false) {
                     return smallvec![];
                 }
                 self.remade.insert(*component);

@@ -17,6 +17,8 @@ pub struct Touched {
     pub(super) properties: FxHashMap<MemberRef, Value>,
     pub(super) ports: FxHashMap<MemberRef, Option<Value>>,
     pub(super) states: FxHashMap<ComponentName, RunState>,
+    /// Components and connections that they have made (true) or taken away.
+    pub(super) there: FxHashMap<Slot, bool>,
     /// Operations that they have called, and take back by themselves.
     pub(super) calls: FxHashSet<MemberRef>,
     /// Frames whose place they have taken, with what takes each of them back: who was doing that leaves it done.
@@ -36,6 +38,12 @@ impl Touched {
             }
             Step::PortWrite { port, value } => {
                 self.ports.insert(*port, value.clone());
+            }
+            Step::Create { .. } | Step::Connect { .. } => {
+                self.there.insert(slot(step), true);
+            }
+            Step::Destroy { .. } | Step::Disconnect { .. } => {
+                self.there.insert(slot(step), false);
             }
             _ => {}
         }
@@ -95,6 +103,7 @@ impl Touched {
         self.properties.extend(other.properties);
         self.ports.extend(other.ports);
         self.states.extend(other.states);
+        self.there.extend(other.there);
         self.calls.extend(other.calls);
         self.gone.extend(other.gone);
     }
@@ -102,6 +111,21 @@ impl Touched {
     /// The run state that is wanted of `component`, if one is.
     pub fn wants(&self, component: ComponentName) -> Option<RunState> {
         self.states.get(&component).copied()
+    }
+
+    /// Whether they want `component` there, or gone, if they want one of them.
+    pub fn wants_there(&self, component: ComponentName) -> Option<bool> {
+        self.there.get(&Slot::Component(component)).copied()
+    }
+
+    /// Whether they want it otherwise than `step` leads to.
+    pub fn opposes(&self, step: &Step) -> bool {
+        match step {
+            Step::State { component, transition } => self.wants(*component).is_some_and(|of| of != transition.target()),
+            Step::Create { .. } | Step::Connect { .. } => self.there.get(&slot(step)) == Some(&false),
+            Step::Destroy { .. } | Step::Disconnect { .. } => self.there.get(&slot(step)) == Some(&true),
+            _ => false,
+        }
     }
 
     /// Whether `step` brings about what is wanted: a run state that was demanded, or what one of theirs writes, calls or makes.

@@ -1,6 +1,6 @@
 //! Files that differ in values of properties alone: what follows from one of them follows from the other, so it is followed once.
 
-use super::composed::{catalogue, files, load};
+use super::composed::{HANDS_DOWN, catalogue, files, load};
 use davit::check::{self, is_alike};
 use davit::lang::Sources;
 use davit::model::{Deployment, Severity};
@@ -20,6 +20,26 @@ fn instances_that_differ_in_values_alone_are_followed_once() {
     let once = followed("0.7", "0.7");
     assert_eq!(once, followed("0.7", "0.6"));
     // 1.0 is what the property has by itself: that it is set changes nothing there.
+    let (left, right) = (followed("1.0", "0.6"), followed("0.6", "1.0"));
+    assert!(left.0.states > once.0.states && right.0.states > once.0.states, "{left:?} {right:?} {once:?}");
+}
+
+/// The same of files with subsystems of their own.
+#[test]
+fn instances_with_subsystems_that_differ_in_values_alone_are_followed_once() {
+    let followed = |left: &str, right: &str| {
+        let text = format!(
+            "left: {{ deployment: mid.yaml, parameters: {{ stiffness: {left} }} }}\n  right: {{ deployment: mid.yaml, parameters: {{ stiffness: {right} }} }}"
+        );
+        let before = "left: { deployment: arm.yaml, parameters: { gain: 0.7 } }\n  right: { deployment: arm.yaml }";
+        let [one, other] = HANDS_DOWN;
+        let whole = load(&files(&[one, other, ("pair.yaml", before, &text)]), "pair.yaml", &[]).deployment.unwrap();
+        let report = check::run(whole.clone(), &catalogue(&whole));
+        let found: Vec<_> = report.findings.iter().map(|finding| (finding.code, finding.message.clone())).collect();
+        (report.explored, report.left, found)
+    };
+    let once = followed("0.7", "0.7");
+    assert_eq!(once, followed("0.7", "0.6"));
     let (left, right) = (followed("1.0", "0.6"), followed("0.6", "1.0"));
     assert!(left.0.states > once.0.states && right.0.states > once.0.states, "{left:?} {right:?} {once:?}");
 }

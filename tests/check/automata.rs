@@ -190,3 +190,158 @@ fn what_is_told_of_a_failure_only_is_no_way_down() {
     let by_itself = told("trans { src = 'on', tgt = 'leaving', events = { 'e_after(1)' }, effect = { 'e_sick' } },");
     assert_eq!(by_itself, Vec::<String>::new());
 }
+
+/// So many events raised in one step, and the subsystem may tell something before it takes the first of them.
+fn told_before(events: usize) -> check::Report {
+    let list = |of: &dyn Fn(usize) -> String| (1..=events).map(of).collect::<Vec<_>>().join(", ");
+    let child = format!(
+        "davit: 1\nname: child\nplatform: simulated\ntypes: {{ Drive: {{}} }}\nconfigurations: [child_conf.lua]\ncoordinator: child.lua
+deploy: {{ event: e_start, up: on, within_s: 5 }}\nshutdown: {{ event: e_shutdown, down: idle, within_s: 5 }}
+accepts: [{}]\nemits: [e_lost, e_all]\n",
+        list(&|i| format!("e_{i}"))
+    );
+    let states: String = (1..=events).map(|i| format!("s{i} = state {{}}, ")).collect();
+    let steps: String = (1..=events)
+        .map(|i| {
+            let (from, effect) = (if i == 1 { "on".to_owned() } else { format!("s{}", i - 1) }, if i == events { "e_all" } else { "" });
+            let effect = if effect.is_empty() { String::new() } else { format!(", effect = '{effect}'") };
+            format!("trans {{ src = '{from}', tgt = 's{i}', events = {{ 'e_{i}' }}{effect} }}, trans {{ src = 's{i}', tgt = 'off', events = {{ 'e_shutdown' }} }},")
+        })
+        .collect();
+    let child_chart = format!(
+        "return state {{ idle = state {{}}, making = state {{ entry = 'make' }}, on = state {{}}, lost = state {{}}, off = state {{ entry = 'make.undo' }}, {states}
+  trans {{ src = 'initial', tgt = 'idle' }}, trans {{ src = 'idle', tgt = 'making', events = {{ 'e_start' }} }},
+  trans {{ src = 'making', tgt = 'on', events = {{ 'make.ok' }} }}, trans {{ src = 'making', tgt = 'off', events = {{ 'e_shutdown', 'make.failed', 'make.broken' }} }},
+  trans {{ src = 'on', tgt = 'lost', events = {{ 'D.faulted' }}, effect = 'e_lost' }}, {steps}
+  trans {{ src = 'on', tgt = 'off', events = {{ 'e_shutdown' }} }}, trans {{ src = 'lost', tgt = 'off', events = {{ 'e_shutdown' }} }},
+  trans {{ src = 'off', tgt = 'idle', events = {{ 'make.undone', 'make.undo.failed', 'make.undo.broken' }} }} }}"
+    );
+    let parent = "davit: 1\nname: parent\nplatform: simulated\ntypes: { Gain: {} }\nsubsystems: { a: { deployment: child.yaml } }
+configurations: [parent_conf.lua]\ncoordinator: parent.lua
+deploy: { event: e_start, up: on, within_s: 10 }\nshutdown: { event: e_shutdown, down: idle, within_s: 10 }\n";
+    let raised = list(&|i| format!("'a/e_{i}'"));
+    let chart = format!(
+        "return state {{ idle = state {{}}, raising = state {{}}, making = state {{ entry = 'own' }}, on = state {{}}, busy = state {{}},
+  trap = state {{ entry = 'again' }}, bad = state {{}}, off = state {{ entry = 'own.undo' }}, low = state {{ entry = 'a/e_shutdown' }},
+  trans {{ src = 'initial', tgt = 'idle' }}, trans {{ src = 'idle', tgt = 'raising', events = {{ 'e_start' }}, effect = 'a/e_start' }},
+  trans {{ src = 'raising', tgt = 'making', events = {{ 'a/up' }} }}, trans {{ src = 'raising', tgt = 'low', events = {{ 'a/failed', 'e_shutdown' }} }},
+  trans {{ src = 'making', tgt = 'on', events = {{ 'own.ok' }} }}, trans {{ src = 'making', tgt = 'off', events = {{ 'own.failed', 'own.broken', 'e_shutdown' }} }},
+  trans {{ src = 'on', tgt = 'busy', events = {{ 'e_go' }}, effect = {{ {raised} }} }}, trans {{ src = 'busy', tgt = 'bad', events = {{ 'a/e_all' }} }},
+  trans {{ src = 'busy', tgt = 'trap', events = {{ 'a/e_lost' }} }}, trans {{ src = 'trap', tgt = 'bad', events = {{ 'again.ok', 'again.failed', 'again.broken' }} }},
+  trans {{ src = 'on', tgt = 'off', events = {{ 'e_shutdown' }} }}, trans {{ src = 'busy', tgt = 'off', events = {{ 'e_shutdown' }} }},
+  trans {{ src = 'trap', tgt = 'off', events = {{ 'e_shutdown' }} }}, trans {{ src = 'bad', tgt = 'off', events = {{ 'e_shutdown' }} }},
+  trans {{ src = 'off', tgt = 'low', events = {{ 'own.undone', 'own.undo.failed', 'own.undo.broken' }} }},
+  trans {{ src = 'low', tgt = 'idle', events = {{ 'a/down', 'a/e_shutdown.ignored' }} }} }}"
+    );
+    let made = "Configuration { create('G', 'Gain') }";
+    let files = [
+        ("child.yaml", child),
+        (
+            "child_conf.lua",
+            "ConfiguratorConf { make = Configuration { create('D', 'Drive'), post_conf_state = { 'D:running' } } }"
+                .to_owned(),
+        ),
+        ("child.lua", child_chart),
+        ("parent.yaml", parent.to_owned()),
+        ("parent_conf.lua", format!("ConfiguratorConf {{ own = {made}, again = {made} }}")),
+        ("parent.lua", chart),
+    ];
+    let loaded = load(&davit::lang::Sources::memory(files), "parent.yaml", &[]);
+    let deployment = loaded.deployment.unwrap_or_else(|| panic!("{:#?}", loaded.findings));
+    let catalogue = catalogue(&deployment);
+    check::run(deployment, &catalogue)
+}
+
+/// What a parent raises lies in a subsystem's inbox, up to three events: where it raises more, it is said that this was not followed.
+#[test]
+fn more_than_is_followed_untaken_is_told() {
+    for events in [2, 3] {
+        let refused = told_before(events).findings;
+        assert!(refused.iter().any(|finding| finding.code.0 == "coord::request_refused"), "{events}: {refused:#?}");
+    }
+    for events in [4, 6] {
+        let report = told_before(events);
+        let said = report.left.iter().any(|left| left.contains("more than 3 events that a subsystem has not taken"));
+        assert!(said && !report.explored.complete, "{events}: {:?} {:?}", report.verdict, report.left);
+    }
+}
+
+/// A safety event may have led a subsystem elsewhere on its way down: where its parent then only waits for it, nothing leads down.
+#[test]
+fn who_waits_for_one_that_was_led_elsewhere_waits_in_vain() {
+    let child = "davit: 1
+name: child
+platform: simulated
+types: { Motor: { actuator: true, moves: [start], ports: { speed: { direction: in, type: float } } } }
+configurations: [child_conf.lua]
+coordinator: child.lua
+deploy: { event: e_start, up: on, failed: [failed], within_s: 5 }
+shutdown: { event: e_end, down: idle, within_s: 5, rest: [halt] }
+safety: [e_stop]
+";
+    let conf = "ConfiguratorConf { make = Configuration { create('M', 'Motor'), post_conf_state = { 'M:running' } },
+  halt = Configuration { safe = true, port_write('M.speed', 0.0) } }";
+    // `by_itself`: what it holds it lets go of after a second.
+    let chart = |by_itself: &str| {
+        format!(
+            "return state {{ idle = state {{}}, making = state {{ entry = 'make' }}, on = state {{}}, failed = state {{}}, held = state {{ config = 'halt' }},
+  off = state {{ entry = 'make.undo' }}, left = state {{}},
+  trans {{ src = 'initial', tgt = 'idle' }}, trans {{ src = 'idle', tgt = 'making', events = {{ 'e_start' }} }},
+  trans {{ src = 'making', tgt = 'on', events = {{ 'make.ok' }} }}, trans {{ src = 'making', tgt = 'failed', events = {{ 'make.failed', 'make.broken' }} }},
+  trans {{ src = 'making', tgt = 'held', events = {{ 'e_stop' }} }}, trans {{ src = 'on', tgt = 'held', events = {{ 'e_stop' }} }},
+  trans {{ src = 'off', tgt = 'held', events = {{ 'e_stop' }} }}, trans {{ src = 'failed', tgt = 'held', events = {{ 'e_stop' }} }},
+  trans {{ src = 'left', tgt = 'held', events = {{ 'e_stop' }} }}, trans {{ src = 'held', tgt = 'held', events = {{ 'e_stop' }} }},
+  trans {{ src = 'making', tgt = 'off', events = {{ 'e_end' }} }}, trans {{ src = 'on', tgt = 'off', events = {{ 'e_end' }} }},
+  trans {{ src = 'held', tgt = 'off', events = {{ 'e_end' {by_itself} }} }}, trans {{ src = 'left', tgt = 'off', events = {{ 'e_end' }} }},
+  trans {{ src = 'failed', tgt = 'off', events = {{ 'e_end' }} }}, trans {{ src = 'off', tgt = 'off', events = {{ 'e_end' }} }},
+  trans {{ src = 'off', tgt = 'idle', events = {{ 'make.undone' }} }}, trans {{ src = 'off', tgt = 'left', events = {{ 'make.undo.failed', 'make.undo.broken' }} }} }}"
+        )
+    };
+    let parent = "davit: 1
+name: parent
+platform: simulated
+types: {}
+subsystems: { s: { deployment: child.yaml } }
+configurations: []
+coordinator: parent.lua
+deploy: { event: e_start, up: on, failed: [failed], within_s: 9 }
+shutdown: { event: e_end, down: idle, within_s: 9 }
+safety: [e_stop]
+";
+    let lead = |more: &str| {
+        format!(
+            "return state {{ idle = state {{}}, raising = state {{}}, on = state {{}}, failed = state {{}}, lowering = state {{}}, {more}
+  trans {{ src = 'initial', tgt = 'idle' }}, trans {{ src = 'idle', tgt = 'raising', events = {{ 'e_start' }}, effect = 's/e_start' }},
+  trans {{ src = 'raising', tgt = 'on', events = {{ 's/up' }} }}, trans {{ src = 'raising', tgt = 'failed', events = {{ 's/failed' }} }},
+  trans {{ src = 'raising', tgt = 'lowering', events = {{ 'e_end' }}, effect = 's/e_end' }}, trans {{ src = 'on', tgt = 'lowering', events = {{ 'e_end' }}, effect = 's/e_end' }},
+  trans {{ src = 'failed', tgt = 'lowering', events = {{ 'e_end' }}, effect = 's/e_end' }}, trans {{ src = 'lowering', tgt = 'idle', events = {{ 's/down' }} }} }}"
+        )
+    };
+    let in_vain = |by_itself: &str, more: &str| {
+        let files = [
+            ("child.yaml", child.to_owned()),
+            ("child_conf.lua", conf.to_owned()),
+            ("child.lua", chart(by_itself)),
+            ("parent.yaml", parent.to_owned()),
+            ("parent.lua", lead(more)),
+        ];
+        let loaded = load(&davit::lang::Sources::memory(files), "parent.yaml", &[]);
+        let deployment = loaded.deployment.unwrap_or_else(|| panic!("{:#?}", loaded.findings));
+        let catalogue = catalogue(&deployment);
+        let found = check::run(deployment, &catalogue).findings;
+        assert!(!found.iter().any(Finding::is_error), "{found:#?}");
+        let says = with(&found, "coord::no_way_down", Severity::Warning);
+        says.into_iter().filter(|says| says.contains("tells nothing more by itself")).collect::<Vec<_>>()
+    };
+    let says = in_vain("", "");
+    assert!(says.len() == 1 && says[0].contains("root.lowering") && says[0].contains("`s/e_end`"), "{says:?}");
+    assert_eq!(
+        in_vain("", "trans { src = 'lowering', tgt = 'lowering', events = { 'e_end' }, effect = 's/e_end' },"),
+        [""; 0]
+    );
+    assert_eq!(
+        in_vain("", "trans { src = 'lowering', tgt = 'lowering', events = { 'e_after(1)' }, effect = 's/e_end' },"),
+        [""; 0]
+    );
+    assert_eq!(in_vain(", 'e_after(1)'", ""), [""; 0]);
+}

@@ -411,6 +411,51 @@ fn a_subsystem_takes_nothing_away_before_it_is_let_go() {
     assert!(one(&before, "compose::unleft").0.contains("`D`"));
 }
 
+/// What hands its own parameter down to the arm in it.
+pub const HANDS_DOWN: [(&str, &str, &str); 2] = [
+    ("mid.yaml", "types: {}", "types: {}\nparameters: { stiffness: { type: float, default: 0.4, max: 9.0 } }"),
+    (
+        "mid.yaml",
+        "inner: { deployment: arm.yaml }",
+        "inner: { deployment: arm.yaml, parameters: { gain: { parameter: stiffness } } }",
+    ),
+];
+
+#[test]
+fn parameters_are_handed_down() {
+    let given = |left: &'static str| {
+        let passed = ("pair.yaml", "left: { deployment: arm.yaml, parameters: { gain: 0.7 } }", left);
+        [HANDS_DOWN[0], HANDS_DOWN[1], passed]
+    };
+    let value = |left: &'static str, set: &[(&str, &str)]| {
+        let loaded = load(&files(&given(left)), "pair.yaml", set);
+        assert!(loaded.findings.is_empty(), "{:#?}", loaded.findings);
+        let deployment = loaded.deployment.unwrap();
+        let make = deployment.configurations.iter().find(|c| c.id.as_str() == "left/inner/make").unwrap();
+        make.changes.iter().map(|change| change.kind.to_string()).collect::<Vec<_>>().join("; ")
+    };
+    assert!(value("left: { deployment: mid.yaml }", &[]).contains("D.k = 0.4"));
+    let wide = "left: { deployment: mid.yaml, parameters: { stiffness: 0.9 } }";
+    assert!(value(wide, &[]).contains("D.k = 0.9"));
+    assert!(value(wide, &[("left.stiffness", "1.1")]).contains("D.k = 1.1"));
+    // What is given to the inner one itself goes before.
+    assert!(value(wide, &[("left.stiffness", "1.1"), ("left.inner.gain", "1.2")]).contains("D.k = 1.2"));
+    // It is held to what both declare.
+    let (says, _) = one(&given("left: { deployment: mid.yaml, parameters: { stiffness: 3.0 } }"), "compose::parameter");
+    assert!(says.starts_with("the parameter `gain`: 3 is outside 0 … 2"), "{says}");
+    let mut slip = given(wide);
+    slip[1].2 = "inner: { deployment: arm.yaml, parameters: { gain: { parameter: stifness } } }";
+    let all = load(&files(&slip), "pair.yaml", &[]).findings;
+    let told: Vec<_> = all.iter().filter(|f| f.is_error()).map(|f| (f.message.as_str(), f.help.as_deref())).collect();
+    assert_eq!(told, [("this file has no parameter `stifness`", Some("did you mean `stiffness`?"))]);
+    (slip[0].2, slip[2].2) = ("types: {}", "left: { deployment: mid.yaml }");
+    let (says, help) = one(&slip, "compose::parameter");
+    assert!(
+        says.contains("has no parameter") && help.contains("`parameters: { stifness: { type: float } }`"),
+        "{says} {help}"
+    );
+}
+
 #[test]
 fn parameters_are_typed_and_given_once() {
     let gain =
@@ -643,14 +688,15 @@ fn a_fault_may_be_of_a_step_of_a_subsystem_that_exports_nothing_of_it() {
     assert_eq!(with("start middle/D").len(), 1);
 }
 
-/// So many arms with nothing in common, each led by a coordinator of its own.
-fn fleet(n: usize) -> Sources {
+/// So many arms with nothing in common, each led by a coordinator of its own; `alike`: these are the same but for names.
+fn fleet(n: usize, alike: bool) -> Sources {
     let lead = "return state { idle = state {}, raising = state { entry = 'NAME/e_start' }, on = state {}, failed = state {},
   lowering = state { entry = { 'NAME/e_shutdown', 'NAME/e_released' } },
   trans { src = 'initial', tgt = 'idle' }, trans { src = 'idle', tgt = 'raising', events = { 'e_start' } },
   trans { src = 'raising', tgt = 'on', events = { 'NAME/up' } }, trans { src = 'raising', tgt = 'failed', events = { 'NAME/failed' } },
   trans { src = 'raising', tgt = 'lowering', events = { 'e_shutdown' } }, trans { src = 'failed', tgt = 'lowering', events = { 'e_shutdown' } },
   trans { src = 'on', tgt = 'lowering', events = { 'e_shutdown' } }, trans { src = 'lowering', tgt = 'idle', events = { 'NAME/down' } } }";
+    let lead = |i: usize| if alike { lead.to_owned() } else { lead.replace("raising", &format!("raising{i}")) };
     let all = |of: &dyn Fn(usize) -> String| (0..n).map(of).collect::<Vec<_>>().join(", ");
     let fleet = format!(
         "davit: 1\nname: fleet\nplatform: simulated\ntypes: {{}}\nsubsystems: {{ {} }}\nconfigurations: [none.lua]\ncoordinators: {{ {} }}\n\
@@ -667,15 +713,16 @@ fn fleet(n: usize) -> Sources {
         ("none.lua".to_owned(), "ConfiguratorConf {}".to_owned()),
         ("fleet.yaml".to_owned(), fleet),
     ];
-    files.extend((0..n).map(|i| (format!("c{i}.lua"), lead.replace("NAME", &format!("r{i}")))));
+    files.extend((0..n).map(|i| (format!("c{i}.lua"), lead(i).replace("NAME", &format!("r{i}")))));
     Sources::memory(files)
 }
 
-/// What many subsystems take beside their own file grows with their number, and no faster.
+/// What many subsystems take beside their own file grows with their number where each is led by another coordinator, and no faster; where these are the
+/// same but for names it does not grow.
 #[test]
-fn eight_take_no_more_than_four_times_what_two_take() {
-    let followed = |n: usize| {
-        let whole = load(&fleet(n), "fleet.yaml", &[]).deployment.unwrap();
+fn what_many_subsystems_take() {
+    let followed = |n: usize, alike: bool| {
+        let whole = load(&fleet(n, alike), "fleet.yaml", &[]).deployment.unwrap();
         let report = check::run(whole.clone(), &catalogue(&whole));
         let errors: Vec<&Finding> = report.findings.iter().filter(|finding| finding.is_error()).collect();
         assert!(
@@ -685,9 +732,11 @@ fn eight_take_no_more_than_four_times_what_two_take() {
         );
         report.explored.states
     };
-    let (two, eight, nine) = (followed(2), followed(8), followed(9));
+    let (two, eight, nine) = (followed(2, false), followed(8, false), followed(9, false));
     assert!(eight < 4 * two, "{two} {eight}");
     assert_eq!(nine - eight, (eight - two) / 6, "each takes the same");
+    let (one, two, eight) = (followed(1, true), followed(2, true), followed(8, true));
+    assert_eq!((two, eight), (one, one));
 }
 
 /// Files that lead down each by itself, and not together: all of them are driven up and down as one, too.

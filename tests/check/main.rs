@@ -19,6 +19,7 @@ mod circles;
 mod composed;
 mod deeper;
 mod demands;
+mod exchanged;
 mod exclusive;
 mod flat_coupling;
 mod flat_plans;

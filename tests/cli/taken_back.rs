@@ -30,12 +30,14 @@ type Case = (&'static str, [&'static str; 4], &'static str, &'static str, &'stat
 const NOTHING: &str = "changes: [{ property_set: { property: m.limit, value: 0.5 } }]";
 const APART: &str = "changes: [{ disconnect: { from: l.o, to: m.ref } }]";
 const TOGETHER: &str = "changes: [{ connect: { from: l.o, to: m.ref, policy: data } }]";
+const TOGETHER_TOO: &str = "changes: [{ connect: { from: x.o, to: n.ref, policy: data } }]";
 const BRAKE: &str = "changes: [{ operation_call: { operation: m.brake } }]";
 const CLAMP: &str = "changes: [{ operation_call: { operation: m.clamp } }]";
 const LIMIT: &str = "changes: [{ property_set: { property: m.limit, value: 0.1 } }]";
 const LIMIT_OPEN: &str = "changes: [{ property_set: { property: m.limit, value: 0.7 } }]";
 const STILL: &str = "changes: [{ port_write: { port: m.speed, value: 0.0 } }]";
 const OTHER: &str = "changes: [{ property_set: { property: n.limit, value: 0.1 } }]";
+const GONE: &str = "changes: [{ destroy: { component: x } }]";
 const DOWN: &str = "post_conf_state: [\"m:unconfigured\"]";
 const N: &str = "create: { component: n, type: Motor }";
 const L: &str = "create: { component: l, type: Lamp }";
@@ -248,6 +250,60 @@ const CASES: &[Case] = &[
         "slow 0.2 off 0.1 stop 8",
         "unclamp unclamp",
     ),
+    // What it destroys as well is made again by its end, and not by the way back of what it interrupts.
+    (
+        "create: { component: n, type: Motor } }, { create: { component: x, type: Lamp }",
+        [GONE, "changes: [{ port_write: { port: n.speed, value: 0.5 } }]", GONE, STILL],
+        "fault('port_write n.speed', 'slow', 1, 0.5)",
+        "slow 0.2 fast 0.3 stop 3",
+        "",
+    ),
+    (
+        "create: { component: n, type: Motor } }, { create: { component: x, type: Lamp }",
+        [
+            "changes: [{ destroy: { component: x } }, { port_write: { port: n.speed, value: 0.5 } }]",
+            NOTHING,
+            "post_conf_state: [\"m:stopped\"], changes: [{ destroy: { component: x } }]",
+            STILL,
+        ],
+        "fault('port_write n.speed', 'slow', 1, 0.5)",
+        "slow 0.1 stop 3",
+        "",
+    ),
+    // What the first press is still bringing back is brought back once more, and the motor ends as it was before both.
+    (
+        N,
+        [DOWN, NOTHING, "post_conf_state: [\"m:stopped\"]", STILL],
+        "fault('configure m', 'lost', 1)",
+        "slow 0.2 stop 0.5 stop 3",
+        "",
+    ),
+    // What the first press left to the second one, and that did not come to, nobody has done.
+    (
+        N,
+        [
+            "changes: [{ port_write: { port: n.speed, value: 0.5 } }]",
+            NOTHING,
+            "pre_conf_state: [\"m:unconfigured\"]",
+            STILL,
+        ],
+        "fault('port_write n.speed', 'lost', 1) fault('stop m', 'slow', 1, 1.3)",
+        "slow 0.2 stop 0.5 stop 5",
+        "",
+    ),
+    // What the first press was to write is written by the third in its place: the second one gives nothing of it back.
+    (
+        LED,
+        [
+            APART,
+            NOTHING,
+            "changes: [{ property_set: { property: m.limit, value: 0.1 } }, { port_write: { port: m.speed, value: 0.0 } }]",
+            "changes: [{ property_set: { property: m.limit, value: 0.2 } }, { port_write: { port: m.speed, value: 0.0 } }]",
+        ],
+        "fault('connect l.o', 'lost', 1)",
+        "slow 0.2 stop 0.5 stop 0 halt 9",
+        "",
+    ),
 ];
 
 /// Files of these: what is made beside the motor `m`, and `slow`, `fast`, `stop`, `halt`.
@@ -328,6 +384,81 @@ fn what_is_left_of_what_it_interrupts_is_its_own_matter() {
         );
         let ran = demo.run(&["run", "s.lua", "--clock", "simulated", "--quiet"]);
         assert_eq!((ran.out.trim(), ran.code), ("3 slow 0.5", 0), "{second}: {}", ran.err);
+    }
+}
+
+/// What it interrupts, or takes the place of, has made or unmade the same: it is so while it holds, with *ok*, and back at its end.
+#[test]
+fn what_is_so_already_counts_as_done() {
+    let made = "create: { component: n, type: Motor } }, { create: { component: x, type: Lamp } }, { create: { component: l, type: Lamp } }, { connect: { from: l.o, to: m.ref, policy: data }";
+    let cases = [
+        ("destroy: { component: x }", "nil nil 1"),
+        ("disconnect: { from: l.o, to: m.ref }", "nil unconfigured 0"),
+        ("connect: { from: x.o, to: n.ref, policy: data }", "nil unconfigured 2"),
+        ("create: { component: k, type: Lamp }", "unconfigured unconfigured 1"),
+    ];
+    for (act, held) in cases {
+        let both = format!("changes: [{{ {act} }}, {{ port_write: {{ port: n.speed, value: 0.5 }} }}]");
+        let stop = format!("post_conf_state: [\"m:stopped\"], changes: [{{ {act} }}]");
+        // In the middle of it, and after it.
+        for slow in [0.5, 0.0] {
+            let demo = arm(&chart(), made, &[&both, NOTHING, &stop, STILL]);
+            demo.write(
+                "s.lua",
+                &format!(
+                    "local function at()
+                       return tostring(state('k')) .. ' ' .. tostring(state('x')) .. ' ' .. #system().connections
+                     end
+                     deploy('deployment.yaml') wait(0.2) fault('port_write n.speed', 'slow', 1, {slow})
+                     raise('e_slow') wait(0.2) raise('e_stop') wait(1) say('held ' .. at() .. ' ' .. #stack())
+                     raise('e_reset') wait(0.5) raise('e_reset') wait(0.5)
+                     say('over ' .. at() .. ' ' .. #stack() .. ' ' .. #drift()) shutdown()"
+                ),
+            );
+            let ran = demo.run(&["run", "s.lua", "--clock", "simulated"]);
+            let told: Vec<&str> =
+                ran.out.lines().filter(|line| line.starts_with("held") || line.starts_with("over")).collect();
+            let (held, over) = (format!("held {held} 3"), "over nil unconfigured 1 2 0");
+            assert_eq!((told.as_slice(), ran.code), (&[held.as_str(), over][..], 0), "{act}: {}{}", ran.out, ran.err);
+            assert!(ran.out.contains("stop.ok"), "{act} {slow}: {}", ran.out);
+        }
+    }
+}
+
+/// A switch takes back, late, what the emergency that has interrupted it does as well: while that holds it is as it wants it, and its end leads back.
+#[test]
+fn what_a_switch_brings_back_late_is_not_left() {
+    let made = "create: { component: n, type: Motor } }, { create: { component: x, type: Lamp } }, { create: { component: l, type: Lamp } }, { connect: { from: l.o, to: m.ref, policy: data }";
+    let cases = [
+        ("post_conf_state: [\"m:stopped\"]", "start m", "stopped unconfigured 1"),
+        ("post_conf_state: [\"m:unconfigured\"]", "configure m", "unconfigured unconfigured 1"),
+        (APART, "connect l.o", "running unconfigured 0"),
+        (TOGETHER_TOO, "disconnect x.o", "running unconfigured 2"),
+        (GONE, "create x", "running nil 1"),
+        ("changes: [{ create: { component: k, type: Lamp } }]", "destroy k", "running unconfigured 1 k"),
+    ];
+    for (both, step, held) in cases {
+        for (how, fast) in [("'slow', 1, 0.3", NOTHING), ("'slow', 1, 0.3", STILL), ("'late', 1", NOTHING)] {
+            let demo = arm(&chart(), made, &[both, fast, both, STILL]);
+            demo.write(
+                "s.lua",
+                &format!(
+                    "local function at()
+                       return state('m') .. ' ' .. tostring(state('x')) .. ' ' .. #system().connections .. (state('k') and ' k' or '')
+                     end
+                     deploy('deployment.yaml') wait(0.2) fault('{step}', {how})
+                     raise('e_slow') wait(0.2) raise('e_fast') wait(0.05) raise('e_stop') wait(9)
+                     say('held ' .. at() .. ' ' .. #drift()) raise('e_reset') wait(2)
+                     if #drift() > 0 then recover('back') wait(1) end
+                     raise('e_reset') wait(1) say('over ' .. at() .. ' ' .. #stack() .. ' ' .. #drift()) shutdown()"
+                ),
+            );
+            let ran = demo.run(&["run", "s.lua", "--clock", "simulated"]);
+            let told: Vec<&str> =
+                ran.out.lines().filter(|line| line.starts_with("held") || line.starts_with("over")).collect();
+            let (held, over) = (format!("held {held} 0"), "over running unconfigured 1 2 0");
+            assert_eq!(told, [held.as_str(), over], "{both} {how} {fast}: {}{}", ran.out, ran.err);
+        }
     }
 }
 

@@ -3,7 +3,7 @@
 use davit::app;
 use davit::lang::LoadOptions;
 use davit::libraries;
-use davit::model::{Ask, ConfigId, EventName};
+use davit::model::{Ask, ConfigId, EventName, Severity};
 use davit::session::{Happening, Session, Stage};
 use davit::time::{Clock, Time};
 use std::path::Path;
@@ -228,4 +228,21 @@ fn an_event_of_safety_is_given_to_whom_it_is_meant_for_alone() {
     );
     std::fs::write(script.path(), text).unwrap();
     crate::scenarios::script(script.path(), &[]);
+}
+
+/// Eight robots in four couplings take, beside the file of one robot, less than twice what the two of one coupling take.
+#[test]
+fn eight_robots_are_checked_as_two_are() {
+    let states = |file: &str| {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(file);
+        let read = app::read(&path, &LoadOptions::default(), libraries::builtin())
+            .unwrap_or_else(|refused| panic!("{:?}", refused.findings));
+        let report = davit::check::run(read.deployment, &read.catalogue);
+        let worse: Vec<_> = report.findings.iter().filter(|found| found.severity > Severity::Info).collect();
+        assert!(worse.is_empty(), "{file}: {worse:#?}");
+        report.explored.states
+    };
+    let files = ["deployments/youbot_robot.yaml", "deployments/youbot_coupling.yaml", "examples/fleet/fleet.yaml"];
+    let [robot, two, eight] = files.map(states);
+    assert!(robot < two && eight - robot < 2 * (two - robot), "{robot} {two} {eight}");
 }

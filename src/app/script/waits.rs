@@ -2,7 +2,7 @@
 
 use super::{SharedHost, clock, deadline, error, interrupt, session};
 use crate::model::RequestId;
-use crate::model::finding::did_you_mean;
+use crate::model::finding::{did_you_mean, nearest};
 use crate::session::{Hub, Session};
 
 /// Waits until `look` finds something; tells what was there instead when the time is over.
@@ -72,6 +72,7 @@ pub(super) fn wait_answer(host: &SharedHost, event: &str, seconds: f64) -> mlua:
     if let Some(why) = session(host)?.never_heard(event) {
         return Err(error(why));
     }
+    let meant = meant_event(&*session(host)?, event);
     let (mark, taken) = (host.borrow().mark, host.borrow().taken.clone());
     let number = wait_until(
         host,
@@ -82,9 +83,19 @@ pub(super) fn wait_answer(host: &SharedHost, event: &str, seconds: f64) -> mlua:
             let waiting =
                 if waiting.is_empty() { String::new() } else { format!("; still waiting for {}", waiting.join(", ")) };
             let failed: String = hub.failures_since(mark).iter().map(|why| format!("\n  {why}")).collect();
-            format!("`{event}` was not heard in {seconds} s{waiting}{failed}")
+            format!("`{event}` was not heard in {seconds} s{waiting}{meant}{failed}")
         },
     )?;
     host.borrow_mut().taken.push(number);
     Ok(())
+}
+
+/// Which event that coordinators know may be meant by one that none of them knows: a component may raise it all the same.
+fn meant_event(session: &Session, event: &str) -> String {
+    let known = session.events();
+    if known.iter().any(|known| known.as_str() == event) {
+        return String::new();
+    }
+    let near = nearest(event, known.iter().map(|known| known.as_str()));
+    near.map_or_else(String::new, |near| format!(" (did you mean `{near}`?)"))
 }

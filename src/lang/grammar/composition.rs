@@ -130,7 +130,7 @@ pub static SUBSYSTEM: Object = Object {
         key(
             "parameters",
             Form::Named(&Form::Value),
-            "Values of its parameters.",
+            "Values of its parameters; `{ parameter: NAME }` for one gives it what this file's own parameter of that name is worth.",
             "parameters: { delay_s: 0.02 }",
             ("parameters: 0.02", TEXT_WRONG_TYPE),
         ).without("their defaults"),

@@ -170,7 +170,10 @@ pub fn given(
             continue;
         };
         let (origin, place) = (entry.origin, entry.value.origin);
-        let Some(is) = value(cx, entry.value, "a parameter") else { continue };
+        let Some(is) = value(cx, entry.value, "a parameter") else {
+            values.push(lost(*name, place));
+            continue;
+        };
         match parameter.fit(is) {
             Ok(is) => values.push(Entry { key: name.to_string().into(), origin, value: node_of(&is, place) }),
             Err(error) => {
@@ -193,6 +196,34 @@ pub fn given(
         cx.report(Finding::error(codes::COMPOSE_PARAMETER, message).at(entry.origin).help(help));
     }
     values
+}
+
+/// What a file gives on of its own parameters to its subsystems (`{ parameter: NAME }` for a value). `own`: what these are worth here. Answers the
+/// names of those that some subsystem is given.
+pub fn hand_down(cx: &mut Cx, subsystems: &mut [SubsystemDraft], own: &[Entry]) -> Vec<String> {
+    let mut handed = Vec::new();
+    for entry in subsystems.iter_mut().flat_map(|subsystem| &mut subsystem.parameters) {
+        let of = match &entry.value.kind {
+            Kind::Map(of) if of.len() == 1 && of[0].key == "parameter" => &of[0].value,
+            _ => continue,
+        };
+        let Kind::Str(name) = &of.kind else { continue };
+        let (name, at) = (name.to_string(), of.origin);
+        if let Some(known) = own.iter().find(|known| known.key == name.as_str()) {
+            entry.value = Node { origin: at, ..known.value.clone() };
+            handed.push(name);
+        } else {
+            let known = own.iter().map(|known| &*known.key);
+            let help = match own {
+                [] => format!("declare it in this file: `parameters: {{ {name}: {{ type: float }} }}`"),
+                _ => crate::model::finding::did_you_mean(&name, "parameters of this file", known),
+            };
+            let finding = Finding::error(codes::COMPOSE_PARAMETER, format!("this file has no parameter `{name}`"));
+            cx.report(finding.at(at).labelled("to be given on").help(help));
+            entry.value = Node::new(Kind::Poison, at);
+        }
+    }
+    handed
 }
 
 /// One that has no value, which is said: files that read it are not at fault.

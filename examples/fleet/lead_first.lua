@@ -1,0 +1,2 @@
+coupling = "first"
+return rfsm.load("lead.lua")

@@ -1,0 +1,2 @@
+coupling = "fourth"
+return rfsm.load("lead.lua")

@@ -1,0 +1,2 @@
+coupling = "second"
+return rfsm.load("lead.lua")

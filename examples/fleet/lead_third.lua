@@ -1,0 +1,2 @@
+coupling = "third"
+return rfsm.load("lead.lua")

@@ -1,0 +1,102 @@
+//! Whether a parent that waits for a subsystem may wait in vain: a safety event, a fault or a time may have led that one to where it tells nothing by
+//! itself any more, and only an event of its parent leads it on.
+//!
+//! What a subsystem *may* tell is a set: that one of the states which it may be in tells *down* says nothing of the others. So the way down from a state
+//! has to do without it there, or raise something for it.
+
+use super::edges::Edge;
+use super::explore::Graph;
+use super::judge::Traced;
+use super::members::Member;
+use super::product::Product;
+use super::state::{Failed, Move};
+use crate::model::codes::COORD_NO_WAY_DOWN;
+use crate::model::{Finding, Ident};
+use crate::statechart::{EventId, NodeId};
+use rustc_hash::FxHashMap;
+
+impl Graph<'_, '_> {
+    /// One state from which no way leads down where a subsystem is where it was led by something else, of each subsystem.
+    pub(super) fn waits_in_vain(&mut self, found: &mut Traced) {
+        if self.product.knows_less() {
+            return;
+        }
+        for child in 0..self.product.children.len() {
+            let Some(at) = self.waits_in_vain_for(child) else { continue };
+            let (product, state) = (&*self.product, &self.states[at as usize]);
+            let path = product.children[child].path;
+            let message = format!(
+                "from {} no way leads down where `{path}` tells nothing more by itself: something else than its parent may have led it there meanwhile",
+                product.place(state)
+            );
+            let member = &product.members[0];
+            let shutdown = product.deployment.shutdown.event;
+            let finding = Finding::warning(COORD_NO_WAY_DOWN, message)
+                .at(member.chart.origin(state.leaves[0]))
+                .path(format!("coordinator.{}", member.chart.fqn(state.leaves[0])))
+                .also(product.deployment.key_origin("shutdown.down"), "the state that means down")
+                .help(format!(
+                    "let an event lead on from there that raises for `{path}` what ends it (`{shutdown}`, with the effect `{}`); or let `{path}` go on by \
+                     itself",
+                    product.children[child].ends
+                ));
+            let trace = self.trace(at);
+            found.push((finding, trace));
+        }
+    }
+
+    fn waits_in_vain_for(&mut self, child: usize) -> Option<u32> {
+        let path = self.product.children[child].path;
+        let tells: Vec<bool> = self.product.outside.iter().map(|event| event.local(path).is_some()).collect();
+        let raises = self.raising_for(path, &tells);
+        let beliefs = self.product.children[child].beliefs.as_ref()?;
+        let belief = |at: u32| self.states[at as usize].beliefs.get(child).copied().unwrap_or_default();
+        let told = |edge: &Edge| match self.by(edge) {
+            Move::Event(of) | Move::Dropped(of) | Move::Unheard(of) => tells[usize::from(of)],
+            _ => false,
+        };
+        let mut reaches = self.arrives();
+        for (reaches, raises) in reaches.iter_mut().zip(raises) {
+            *reaches |= raises;
+        }
+        let others = self.edges.iter().filter(|edge| !told(edge) && belief(edge.from) != belief(edge.to));
+        others.for_each(|edge| reaches[edge.from as usize] = true);
+        let reaches = self.leading_to(reaches, |_, edge| !told(edge));
+        let in_vain = |at: &u32| {
+            let state = &self.states[*at as usize];
+            !reaches[*at as usize]
+                && state.is_at_rest()
+                && self.failed[*at as usize] == Failed::Nothing
+                && beliefs.may_rest(belief(*at))
+        };
+        let some: Vec<u32> = (0u32..).take(self.states.len()).filter(in_vain).collect();
+        self.best_first(some).first().copied()
+    }
+
+    /// In which states something that may come, and is not told by the subsystem of that path (`tells`: what of outside is), has something raised for it.
+    fn raising_for(&mut self, path: Ident, tells: &[bool]) -> Vec<bool> {
+        let Self { product, reached, .. } = self;
+        let Product { outside, members, .. } = &mut **product;
+        let mut known: FxHashMap<(usize, NodeId), bool> = FxHashMap::default();
+        let mut of = |number: usize, member: &mut Member<'_>, leaf: NodeId| {
+            *known.entry((number, leaf)).or_insert_with(|| {
+                let own: Vec<EventId> = outside
+                    .iter()
+                    .zip(tells)
+                    .filter(|(_, tells)| **tells)
+                    .map(|(event, _)| member.chart.event(*event))
+                    .collect();
+                let offers = member.offers(leaf);
+                offers.iter().filter(|event| !own.contains(event)).any(|event| {
+                    let step = member.react(leaf, *event);
+                    step.emitted.iter().any(|emitted| emitted.event.local(path).is_some())
+                })
+            })
+        };
+        let all = reached
+            .states
+            .iter()
+            .map(|state| (0..members.len()).any(|number| of(number, &mut members[number], state.leaves[number])));
+        all.collect()
+    }
+}
