@@ -109,11 +109,6 @@ impl Beliefs {
         self.filled
     }
 
-    /// Whether it is down, and has taken everything, wherever it may be.
-    pub fn is_down(&self, belief: u32) -> bool {
-        self.all_of(belief).all(|(state, untaken)| untaken[0] == 0 && self.automaton.state(state).down)
-    }
-
     /// Whether it may be where it has taken everything, and tells nothing until something is raised for it.
     pub fn may_rest(&self, belief: u32) -> bool {
         self.all_of(belief).any(|(state, untaken)| untaken[0] == 0 && self.rests[state as usize])

@@ -12,15 +12,18 @@ use crate::model::{
     Ask, Catalogue, ComponentName, ComponentType, ConfigId, Configuration, Deployment, EventName, Ident, Monitor,
     Subsystem, TypeName,
 };
+use crate::stack::contenders::may_hold;
 use crate::statechart::Chart;
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-/// The words of one group by those of another one, and the other way round.
+/// The words of one group by those of another one, and the other way round. What stands behind a point (a verdict, a member), and what is called so in
+/// the file of a subsystem, is the same for both.
 #[derive(Debug, Clone, Default)]
 pub struct Exchange {
     words: BTreeMap<String, String>,
+    subsystems: BTreeSet<Ident>,
 }
 
 /// Where groups are compared.
@@ -39,7 +42,9 @@ impl Exchanging<'_> {
         if one.len() != other.len() || !own.programs.is_empty() {
             return None;
         }
-        let mut exchange = Exchange::default();
+        let subsystems = own.subsystems.iter().map(|subsystem| subsystem.name).collect();
+        let own_words = ["root", "e_done"].map(|word| (word.to_owned(), word.to_owned()));
+        let mut exchange = Exchange { words: own_words.into(), subsystems };
         let (names, others) = (self.names(one), self.names(other));
         let fits = names.len() == others.len() && names.iter().zip(&others).all(|(a, b)| exchange.pair(a, b));
         if !fits {
@@ -89,6 +94,10 @@ impl Exchanging<'_> {
 
     /// Whether each subsystem is what the one is in whose place it comes, and none of them may hold what another one may.
     fn are_kept(&self, subsystems: &[Subsystem], exchange: &Exchange) -> bool {
+        let held = may_hold(self.deployment.configurations.iter(), self.catalogue);
+        if subsystems.iter().any(|subsystem| held.values().any(|names| !names.is_disjoint(&subsystem.holds))) {
+            return false;
+        }
         let apart = |one: &Subsystem| {
             let others = subsystems.iter().filter(|other| other.name != one.name);
             one.holds.is_empty() || others.into_iter().all(|other| other.holds.is_disjoint(&one.holds))
@@ -157,8 +166,20 @@ fn tokens(text: &str) -> impl Iterator<Item = &str> {
 }
 
 impl Exchange {
+    /// A name in what is exchanged of it, and the rest.
+    fn parts<'n>(&self, name: &'n str) -> (&'n str, &'n str) {
+        let end = name.find('.').unwrap_or(name.len());
+        let of_subsystem =
+            name[..end].find('/').filter(|at| self.subsystems.iter().any(|of| of.as_str() == &name[..*at]));
+        name.split_at(of_subsystem.unwrap_or(end))
+    }
+
     /// One name comes in the place of the other. False: it cannot, as that of another one comes there.
     fn pair(&mut self, one: &str, other: &str) -> bool {
+        let ((one, rest), (other, others)) = (self.parts(one), self.parts(other));
+        if rest != others {
+            return false;
+        }
         let (mut a, mut b) = (tokens(one), tokens(other));
         loop {
             match (a.next(), b.next()) {
@@ -202,7 +223,9 @@ impl Exchange {
     }
 
     fn text(&self, text: &str) -> String {
-        tokens(text).map(|token| self.words.get(token).map_or(token, String::as_str)).collect()
+        let (own, rest) = self.parts(text);
+        let own = tokens(own).map(|token| self.words.get(token).map_or(token, String::as_str));
+        own.chain([rest]).collect()
     }
 
     /// The name that `make` makes of the text with words exchanged; the same where that is none.

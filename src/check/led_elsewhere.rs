@@ -9,6 +9,7 @@ use super::explore::Graph;
 use super::judge::Traced;
 use super::members::Member;
 use super::product::Product;
+use super::reactions::triggers;
 use super::state::{Failed, Move};
 use crate::model::codes::COORD_NO_WAY_DOWN;
 use crate::model::{Finding, Ident};
@@ -29,11 +30,18 @@ impl Graph<'_, '_> {
                 "from {} no way leads down where `{path}` tells nothing more by itself: something else than its parent may have led it there meanwhile",
                 product.place(state)
             );
-            let member = &product.members[0];
+            // Who waits for it, of several.
+            let waits = |number: &usize| {
+                let member = &product.members[*number];
+                let mut events = triggers(member.chart, state.leaves[*number]).0.into_iter();
+                events.any(|event| member.name_of(event).is_some_and(|name| name.local(path).is_some()))
+            };
+            let number = (0..product.members.len()).find(waits).unwrap_or_default();
+            let (member, leaf) = (&product.members[number], state.leaves[number]);
             let shutdown = product.deployment.shutdown.event;
             let finding = Finding::warning(COORD_NO_WAY_DOWN, message)
-                .at(member.chart.origin(state.leaves[0]))
-                .path(format!("coordinator.{}", member.chart.fqn(state.leaves[0])))
+                .at(member.chart.origin(leaf))
+                .path(format!("coordinator.{}", member.chart.fqn(leaf)))
                 .also(product.deployment.key_origin("shutdown.down"), "the state that means down")
                 .help(format!(
                     "let an event lead on from there that raises for `{path}` what ends it (`{shutdown}`, with the effect `{}`); or let `{path}` go on by \

@@ -38,12 +38,6 @@ fn raised_anew(state: &mut ProductState, at: usize, begins: bool, ends: bool) {
     }
 }
 
-/// Whether a subsystem can be nowhere but down, by what is known of it.
-fn is_known_down(child: &Child, state: &ProductState, at: usize) -> bool {
-    let belief = state.beliefs.get(at).copied().unwrap_or_default();
-    child.beliefs.as_ref().is_some_and(|beliefs| beliefs.is_down(belief))
-}
-
 impl Product<'_> {
     /// An event is heard, or would be if anybody waited for it: it may tell how a subsystem stands.
     pub(super) fn hears_of_child(&self, state: &mut ProductState, name: EventName) {
@@ -53,10 +47,7 @@ impl Product<'_> {
                 if state.children & released(at) == 0 {
                     state.children |= promised(at);
                 }
-            } else if name == child.down
-                || child.is_down_by(name) && (child.deaf.is_none() || is_over(state, at))
-                || name.local(child.path).is_some() && is_known_down(child, state, at)
-            {
+            } else if name == child.down || child.is_down_by(name) && (child.deaf.is_none() || is_over(state, at)) {
                 state.children &= !(promised(at) | begun(at) | released(at));
             }
         }

@@ -8,9 +8,11 @@ use super::request::{Reason, Request};
 use super::running::{Purpose, Running};
 use super::safety::{Troubled, coming};
 use crate::model::{Ask, ConfigId, Configuration, RequestId, Snapshot, Step, Target, Verdict};
-use crate::stack::{BestEffort, Frame, Planned, Residual, SafeEnd, Stack, but_for_what_is_so, components, effort};
+use crate::stack::{
+    BestEffort, Frame, Planned, Residual, SafeEnd, Stack, beside_what_is_interrupted, components, effort,
+};
 use crate::system::touch::{Slot, slot};
-use crate::system::{System, step, touch};
+use crate::system::{System, is_so, step, touch};
 use crate::transaction::{BrokenPart, Input, OpenStep, PartEnd, Spec, Touched, Transaction};
 use smallvec::SmallVec;
 use std::borrow::Cow;
@@ -56,7 +58,9 @@ impl Engine {
         let before = self.world.as_left_by_safe(before);
         let own =
             |earlier: &[Step]| before.as_ref().map(|before| plan_on(configuration, before, &whole, earlier).frame);
-        let rest = own(&earlier).map(|own| but_for_what_is_so(configuration, &own, &self.world.system));
+        let rest = own(&earlier)
+            .zip(before.as_ref())
+            .map(|(own, before)| beside_what_is_interrupted(configuration, &own, &stack, (&self.world.system, before)));
         let rest = rest.as_deref().unwrap_or(configuration);
         let plan = |system: &System, earlier: &[Step]| plan_on(rest, system, &stack, earlier);
         let BestEffort { mut planned, mut frame, troubles } = plan(&self.world.system, &earlier);
@@ -111,7 +115,14 @@ impl Engine {
         }
         touched.leaves(&frame);
         touched.planned_at(self.world.system.revision());
-        self.safety.troubles.push(Troubled { request: request.id, reasons: troubles, missed: Vec::new() });
+        // What could not be planned is not done, whatever the frame tells.
+        let (done, system) = (&planned.steps, &self.world.system);
+        let is_refused = |step: &Step| {
+            !done.iter().any(|planned| planned.step == *step) && !earlier.contains(step) && !is_so(step, system)
+        };
+        let frame_steps = frame.steps().iter().map(|planned| &planned.step).filter(|_| !troubles.is_empty());
+        let missed = frame_steps.filter(|step| is_refused(step)).cloned().collect();
+        self.safety.troubles.push(Troubled { request: request.id, reasons: troubles, missed });
         let spec = Spec { asked_back: false, ..self.effort([configuration.id]) };
         let purpose = Purpose::Safe(Box::new((request, frame, touched)));
         let machine = Transaction::new(planned, spec);

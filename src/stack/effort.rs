@@ -6,19 +6,19 @@
 use super::net;
 use super::share::{self, HandOver, shares};
 use super::squash::{list, squash};
-use super::there::of_what_is_there;
+use super::there::{is_done, of_what_is_there};
 use super::void::rest;
 use super::work::{Op, Part, Planned, transaction};
 use super::{Edits, Frame, FrameId, Inverse, Reason, Request, Stack};
-use crate::model::{Change, ChangeKind, ComponentName, Configuration, RunState, StateList, Step, Transition, codes};
+use crate::model::{Change, ComponentName, Configuration, RunState, StateList, Step, Transition, codes};
 use crate::plan::footprint::{Footprint, Slot};
 use crate::plan::undo::{DraftStep, absolute, items};
 use crate::plan::{PlanContext, PlannedStep, plan_on};
+use crate::system::touch::slot;
 use crate::system::{Overlay, System, View};
 use crate::time::Time;
 use rustc_hash::{FxHashMap, FxHashSet};
 use smallvec::smallvec;
-use std::borrow::Cow;
 use std::sync::Arc;
 
 /// A safe configuration, planned as far as it goes.
@@ -128,42 +128,6 @@ fn beside(steps: &mut [PlannedStep]) {
         (planned.id, planned.wave) = (id, 0);
     }
     net::components_side_by_side(steps);
-}
-
-/// A safe configuration without the acts that its `frame` tells of, and that are so in the `system` already: what it interrupts has done them, and leaves
-/// them to it.
-pub fn but_for_what_is_so<'c>(
-    configuration: &'c Configuration,
-    frame: &Frame,
-    system: &System,
-) -> Cow<'c, Configuration> {
-    let is_own = |act: &ChangeKind| {
-        frame.steps().iter().any(|planned| match (&planned.step, act) {
-            (Step::Create { component, .. }, ChangeKind::Create { component: of, .. }) => component == of,
-            (Step::Connect { from, to, .. }, ChangeKind::Connect { from: a, to: b, .. })
-            | (Step::Disconnect { from, to }, ChangeKind::Disconnect { from: a, to: b }) => (from, to) == (a, b),
-            _ => false,
-        })
-    };
-    let is_so = |change: &Change| is_done(&change.kind, system) && is_own(&change.kind);
-    if !configuration.changes.iter().any(is_so) {
-        return Cow::Borrowed(configuration);
-    }
-    let mut rest = configuration.clone();
-    rest.changes.retain(|change| !is_so(change));
-    Cow::Owned(rest)
-}
-
-/// Whether an act that would be refused is so already.
-fn is_done(act: &ChangeKind, system: &System) -> bool {
-    match act {
-        ChangeKind::Create { component, ty, .. } => {
-            system.component(*component).is_some_and(|node| node.ty.name == *ty)
-        }
-        ChangeKind::Connect { from, to, policy } => system.link(*from, *to) == Some(*policy),
-        ChangeKind::Disconnect { from, to } => system.link(*from, *to).is_none(),
-        _ => false,
-    }
 }
 
 /// The frame of a safe configuration of a group takes the others of that group over that are still there: it did not find them yet when it
@@ -337,11 +301,21 @@ pub(super) fn owed_no_more(
 }
 
 /// The frame of an earlier safe configuration without what a later one was to do in its place, and did not: nobody has. None: it has nothing of that.
-pub(super) fn but_for_missed(frame: &Frame, missed: &[Step]) -> Option<Frame> {
+/// Run states are as they are in `system`.
+pub(super) fn but_for_missed(frame: &Frame, missed: &[Step], system: &System) -> Option<Frame> {
     let mut left = list(frame);
     let before = left.len();
-    for step in missed.iter().filter(|step| absolute(step).is_none() && !matches!(step, Step::Operation(_))) {
-        if let Some(at) = left.iter().position(|item| undoes(item, step)) {
+    for step in missed.iter().rev().filter(|step| absolute(step).is_none() && !matches!(step, Step::Operation(_))) {
+        // What comes first of this tells how it is, as that frame has it.
+        let is_not_so = |item: &DraftStep| match &item.step {
+            Step::State { component, transition } => {
+                system.component(*component).is_some_and(|node| !transition.allowed_in(node.state))
+            }
+            _ => undoes(item, step),
+        };
+        while let Some(at) =
+            left.iter().position(|item| slot(&item.step) == slot(step)).filter(|at| is_not_so(&left[*at]))
+        {
             left.remove(at);
         }
     }

@@ -39,7 +39,7 @@ mod world;
 pub use answer::{Answer, Reason, Residual, TakenAlong};
 pub use batch::{Group, Rules, Told, held, may_apply, take_up};
 pub use desk::{ActiveBatch, Arrival, Arrived, Desk, GivenUp, Gone, given_up_of};
-pub use effort::{BestEffort, but_for_what_is_so, effort};
+pub use effort::{BestEffort, effort};
 pub use keep::keeps_still;
 pub use leave::Barring;
 pub use net::reduce;
@@ -52,6 +52,7 @@ pub use settle::{About, Ending, Endings, SafeEnd, Settled, Stopped, settle};
 pub use share::{HandOver, calls, components, is_kept, shares, staying};
 pub use stands::{is_stood_down, running_for};
 pub use still::Beside;
+pub use there::beside_what_is_interrupted;
 pub use work::{Along, Op, Part, Planned, places, transaction};
 pub use world::{Broken, SafeWrites, World};
 

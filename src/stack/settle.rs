@@ -167,7 +167,7 @@ impl World {
             of.safe && of.group.is_some() && of.group == frame.group && of.foreign_to(frame.requester).is_none()
         };
         for earlier in self.stack.frames().iter().filter(taken).cloned().collect::<Vec<_>>() {
-            but_for_missed(&earlier, end.missed).into_iter().for_each(|rest| self.stack.replace(rest));
+            but_for_missed(&earlier, end.missed, &self.system).into_iter().for_each(|rest| self.stack.replace(rest));
         }
         let frame = match end.failed {
             None if end.missed.is_empty() => frame,

@@ -74,6 +74,8 @@ pub(super) struct Heed<'t> {
     touched: &'t Touched,
     doomed: FxHashSet<ComponentName>,
     remade: FxHashSet<ComponentName>,
+    /// What it has made and safe configurations have made as well: that stays, and nothing else of it.
+    shared: FxHashSet<ComponentName>,
 }
 
 /// How far up a run state is.
@@ -97,12 +99,12 @@ impl<'t> Heed<'t> {
     /// A way back that begins; it takes away again what `made` has made.
     pub fn new<'s>(touched: &'t Touched, made: impl Iterator<Item = &'s Step>) -> Self {
         let created = made.filter_map(|step| match step {
-            // What they have made as well stays, until their own end.
-            Step::Create { component, .. } => Some(*component).filter(|of| touched.wants_there(*of) != Some(true)),
+            Step::Create { component, .. } => Some(*component),
             _ => None,
         });
-        let doomed = if touched.is_empty() { FxHashSet::default() } else { created.collect() };
-        Self { touched, doomed, remade: FxHashSet::default() }
+        let created = if touched.is_empty() { Vec::new() } else { created.collect() };
+        let (shared, doomed) = created.into_iter().partition(|of| touched.wants_there(*of) == Some(true));
+        Self { touched, doomed, remade: FxHashSet::default(), shared }
     }
 
     /// A step that came in late goes back by itself, or stays since it was overwritten: what it made is then not there to be
@@ -154,6 +156,10 @@ impl<'t> Heed<'t> {
                 if about.iter().any(|component| self.doomed.contains(component)) {
                     let goes = step::precondition(back, view).is_empty();
                     return goes.then(|| back.clone()).into_iter().collect();
+                }
+                if about.iter().any(|component| self.shared.contains(component)) {
+                    let stays = matches!(back, Step::Destroy { .. }) || self.touched.slots.contains(&slot(back));
+                    return (!stays).then(|| back.clone()).into_iter().collect();
                 }
                 if about.iter().any(|component| self.remade.contains(component)) {
                     return self.as_wanted(back).into_iter().collect();

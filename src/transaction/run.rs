@@ -327,12 +327,16 @@ impl StepsRun {
         };
         let Some(reason) = refused else { return true };
         self.finish(i);
-        // Where everything is tried, what is so already need not be done, whoever did it; from now on it is wanted so.
+        self.fails(i, reason, live);
+        false
+    }
+
+    /// A step has failed. Where everything is tried, what is so already need not be done, whoever did it; from now on it is wanted so.
+    fn fails(&mut self, i: u32, reason: Reason, live: &System) {
         match self.tries_all && is_so(&self.list[i as usize].step, live) {
             true => self.note(i, live),
             false => self.failures.push((i, reason)),
         }
-        false
     }
 
     /// What has failed, but is so on what was seen, counts as done.
@@ -400,7 +404,7 @@ impl StepsRun {
         // While the call was out, its component may have failed by itself; then the model's precondition is gone.
         if !known && let Some(reason) = false_precondition(step, live) {
             self.finish(i);
-            self.failures.push((i, reason));
+            self.fails(i, reason, live);
             return;
         }
         self.took_effect(i, live);
@@ -434,7 +438,13 @@ impl StepsRun {
         if matches!(cause, Cause::Panicked(_)) {
             self.made_faulted(step.component(), live);
         }
-        self.failures.push((i, Reason::Step { step, cause }));
+        let refused = matches!(cause, Cause::Refused(_));
+        let reason = Reason::Step { step, cause };
+        match refused {
+            // Somebody else's step may have come to be before it.
+            true => self.fails(i, reason, live),
+            false => self.failures.push((i, reason)),
+        }
     }
 
     pub fn made_faulted(&mut self, component: ComponentName, live: &mut System) {

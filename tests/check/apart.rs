@@ -188,6 +188,8 @@ fn two_youbots_side_by_side_are_followed_to_their_end() {
     let report = run_with(read.deployment, &read.catalogue, Effort::default());
     assert_eq!(report.explored.unfollowed, 0, "{:?}", report.explored);
     assert!(!report.left.iter().any(|left| left.contains("as many as are looked at")), "{:?}", report.left);
+    let behind = "was not followed: with that there are more than 800000 transitions (`--budget`)";
+    assert!(report.left.iter().any(|left| left.contains(behind)), "{:?}", report.left);
     let told: Vec<&str> = (report.findings.iter())
         .filter(|finding| finding.severity > Severity::Info)
         .map(|finding| finding.message.as_str())

@@ -765,3 +765,38 @@ fn files_that_do_not_come_down_together_are_refused() {
     let found = errors(reordered);
     assert!(matches!(&found[..], [(code, trace)] if code == "deploy::never_down" && *trace > 1), "{found:?}");
 }
+
+/// What a subsystem sends to an actuator of its parent: it is watched in its own file, or there it can be; the parent reads what is exported.
+#[test]
+fn what_is_watched_in_a_subsystem_is_watched() {
+    let motor = [
+        (
+            "pair.yaml",
+            "types: {}",
+            "types: { Motor: { actuator: true, ports: { ref: { direction: in, type: float } } } }",
+        ),
+        (
+            "pair_conf.lua",
+            "ConfiguratorConf {",
+            "ConfiguratorConf { drive = Configuration { create('M', 'Motor'), connect('left.pose', 'M.ref') },",
+        ),
+    ];
+    let unwatched = |more: &[(&str, &str, &str)]| -> Vec<(String, String)> {
+        let found = found(&[&motor[..], more].concat());
+        let of = found.into_iter().filter(|finding| finding.code.0 == "deploy::unwatched");
+        of.map(|finding| (finding.message, finding.help.unwrap_or_default())).collect()
+    };
+    let told = unwatched(&[]);
+    assert!(told.len() == 2 && told[0].0.starts_with("`left/D` may die unnoticed"), "{told:?}");
+    assert!(
+        told[0].1.contains("`left.pose` is silent")
+            && told[0].1.contains("of `left`, in its own file, hear `D.faulted`"),
+        "{told:?}"
+    );
+    let hears = (
+        "arm.lua",
+        "  trans { src = 'on', tgt = 'leaving', events = { 'e_shutdown' } },",
+        "  trans { src = 'on', tgt = 'leaving', events = { 'e_shutdown', 'D.faulted' } },",
+    );
+    assert_eq!(unwatched(&[hears]), []);
+}

@@ -2,9 +2,10 @@
 
 use crate::apart_random::{Has, Made, made, told};
 use crate::aside::Chance;
+use crate::composed::{catalogue, load};
 use crate::support::Small;
 use davit::check::{Effort, Report, run_with};
-use davit::model::Code;
+use davit::model::{Code, Severity, codes};
 use std::collections::BTreeSet;
 
 /// What is done to the second one, which is the first one by other names.
@@ -15,6 +16,8 @@ enum Changed {
     Less(usize),
     /// Something of what it asks for is worth something else.
     Other,
+    /// What it does where a request has failed it does where that is broken, and the other way round.
+    Verdicts,
 }
 
 fn copies(seed: u64, changed: Changed) -> [Made; 3] {
@@ -36,6 +39,10 @@ fn copies(seed: u64, changed: Changed) -> [Made; 3] {
         Changed::Other => {
             let conf = &mut all[1].configurations;
             *conf = conf.replace("b_base = Configuration { ", "b_base = Configuration { port_write('b.in', 7.0), ");
+        }
+        Changed::Verdicts => {
+            let chart = &mut all[1].coordinator;
+            *chart = chart.replace(".failed'", ".?'").replace(".broken'", ".failed'").replace(".?'", ".broken'");
         }
     }
     all
@@ -67,14 +74,13 @@ fn said(report: &Report) -> BTreeSet<(Code, String)> {
 #[test]
 fn what_is_the_same_but_for_names_is_judged_as_where_each_is_followed() {
     let cases = std::env::var("DAVIT_EXCHANGED_CASES").map_or(60, |n| n.parse().expect("a number"));
-    let (mut compared, mut fewer, mut found) = (0u64, [0u64; 3], 0u64);
+    let (mut compared, mut fewer, mut found) = (0u64, [0u64; 4], 0u64);
     for seed in 0.. {
         if compared >= cases {
             break;
         }
-        for (kind, changed) in
-            (0..).zip([Changed::Nothing, Changed::Less(usize::try_from(seed).unwrap()), Changed::Other])
-        {
+        let less = Changed::Less(usize::try_from(seed).unwrap());
+        for (kind, changed) in (0..).zip([Changed::Nothing, less, Changed::Other, Changed::Verdicts]) {
             let all = copies(seed, changed);
             let (Some(once), Some(each)) = (report(&all, false), report(&all, true)) else { continue };
             compared += 1;
@@ -106,4 +112,103 @@ fn it_is_followed_once_and_told_of_each() {
         assert_eq!(said(&three), said(&each), "{seed}");
     }
     assert!(clean > 3 && wrong > 3, "{clean} {wrong}");
+}
+
+const LEAF: &str = "davit: 1
+name: leaf
+platform: simulated
+types: { Drive: { exclusive: ['can:{ifname}'], properties: { ifname: { type: string, tunable: unconfigured } } } }
+parameters: { ifname: { type: string } }
+accepts: [e_ask, e_low]
+emits: [e_asked]
+configurations: [leaf_conf.lua]
+coordinator: leaf.lua
+deploy: { event: e_start, up: on, within_s: 5 }
+shutdown: { event: e_shutdown, down: idle, within_s: 5 }
+";
+const LEAF_CONF: &str =
+    "ConfiguratorConf { make = Configuration { create('Drive', 'Drive', { properties = { ifname = ifname } }),
+  post_conf_state = { 'Drive:running' } } }";
+const LEAF_COORDINATOR: &str = "return state {
+  idle = state {}, making = state { entry = 'make' }, on = state {}, asked = state { entry = 'e_asked' }, bad = state {}, removing = state { entry = 'make.undo' },
+  trans { src = 'initial', tgt = 'idle' }, trans { src = 'idle', tgt = 'making', events = { 'e_start' } },
+  trans { src = 'making', tgt = 'on', events = { 'make.ok' } }, trans { src = 'making', tgt = 'bad', events = { 'make.failed', 'make.broken' } },
+  trans { src = 'making', tgt = 'removing', events = { 'e_shutdown' } }, trans { src = 'on', tgt = 'removing', events = { 'e_shutdown' } },
+  trans { src = 'bad', tgt = 'removing', events = { 'e_shutdown' } }, trans { src = 'on', tgt = 'asked', events = { 'e_ask' } },
+  trans { src = 'asked', tgt = 'on', events = { 'e_low' } }, trans { src = 'asked', tgt = 'removing', events = { 'e_shutdown' } },
+  trans { src = 'removing', tgt = 'idle', events = { 'make.undone' } },
+  trans { src = 'removing', tgt = 'bad', events = { 'make.undo.failed', 'make.undo.broken' } } }";
+const PARENT: &str = "davit: 1
+name: parent
+platform: simulated
+types: { Gate: { exclusive: ['can:{bus}'], properties: { bus: { type: string, tunable: unconfigured } } } }
+subsystems:
+  left:  { deployment: leaf.yaml, parameters: { ifname: can0 } }
+  right: { deployment: leaf.yaml, parameters: { ifname: can1 } }
+configurations: [parent_conf.lua]
+coordinators: { a: a.lua, b: b.lua }
+deploy: { event: e_start, up: on, within_s: 10 }
+shutdown: { event: e_shutdown, down: idle, within_s: 10 }
+";
+
+/// Two that lead a leaf each, and make a gate on a bus; how the second one is another one, how many states were followed, and what was found.
+fn found_on_two(buses: [&str; 2], second: &[(&str, &str)]) -> (usize, Vec<Code>) {
+    let lead = |who: &str, own: &str| {
+        format!(
+            "return state {{ idle = state {{}}, raising = state {{ entry = '{who}/e_start' }}, on = state {{}}, asking = state {{ entry = '{who}/e_ask' }},
+  low = state {{ entry = '{who}/e_low' }}, making = state {{ entry = '{own}' }}, made = state {{}}, failed = state {{}}, removing = state {{ entry = '{own}.undo' }},
+  lowering = state {{ entry = '{who}/e_shutdown' }},
+  trans {{ src = 'initial', tgt = 'idle' }}, trans {{ src = 'idle', tgt = 'raising', events = {{ 'e_start' }} }},
+  trans {{ src = 'raising', tgt = 'on', events = {{ '{who}/up' }} }}, trans {{ src = 'raising', tgt = 'lowering', events = {{ 'e_shutdown', '{who}/failed' }} }},
+  trans {{ src = 'on', tgt = 'asking', events = {{ 'e_go' }} }}, trans {{ src = 'asking', tgt = 'low', events = {{ '{who}/e_asked' }} }},
+  trans {{ src = 'asking', tgt = 'lowering', events = {{ 'e_shutdown' }} }},
+  trans {{ src = 'low', tgt = 'making', events = {{ 'e_after(0.1)' }} }}, trans {{ src = 'low', tgt = 'lowering', events = {{ 'e_shutdown' }} }},
+  trans {{ src = 'making', tgt = 'made', events = {{ '{own}.ok' }} }}, trans {{ src = 'making', tgt = 'failed', events = {{ '{own}.failed', '{own}.broken' }} }},
+  trans {{ src = 'making', tgt = 'removing', events = {{ 'e_shutdown' }} }}, trans {{ src = 'made', tgt = 'removing', events = {{ 'e_shutdown' }} }},
+  trans {{ src = 'failed', tgt = 'removing', events = {{ 'e_shutdown' }} }}, trans {{ src = 'on', tgt = 'lowering', events = {{ 'e_shutdown' }} }},
+  trans {{ src = 'removing', tgt = 'lowering', events = {{ '{own}.undone' }} }},
+  trans {{ src = 'removing', tgt = 'failed', events = {{ '{own}.undo.failed', '{own}.undo.broken' }} }},
+  trans {{ src = 'lowering', tgt = 'lowering', events = {{ 'e_shutdown' }} }},
+  trans {{ src = 'lowering', tgt = 'idle', events = {{ '{who}/down', '{who}/e_shutdown.ignored' }} }} }}"
+        )
+    };
+    let mut b = lead("right", "own_right");
+    for (from, to) in second {
+        assert!(b.contains(from), "{from}");
+        b = b.replace(from, to);
+    }
+    let gate = |name: &str, bus: &str| {
+        format!(
+            "Configuration {{ create('{name}', 'Gate', {{ properties = {{ bus = '{bus}' }} }}), post_conf_state = {{ '{name}:running' }} }}"
+        )
+    };
+    let conf =
+        format!("ConfiguratorConf {{ own_left = {}, own_right = {} }}", gate("L", buses[0]), gate("R", buses[1]));
+    let files = [
+        ("leaf.yaml", LEAF.to_owned()),
+        ("leaf_conf.lua", LEAF_CONF.to_owned()),
+        ("leaf.lua", LEAF_COORDINATOR.to_owned()),
+        ("parent.yaml", PARENT.to_owned()),
+        ("parent_conf.lua", conf),
+        ("a.lua", lead("left", "own_left")),
+        ("b.lua", b),
+    ];
+    let loaded = load(&davit::lang::Sources::memory(files), "parent.yaml", &[]);
+    let deployment = loaded.deployment.unwrap_or_else(|| panic!("{:#?}", loaded.findings));
+    let catalogue = catalogue(&deployment);
+    let report = run_with(deployment, &catalogue, Effort::default());
+    let worse = report.findings.iter().filter(|finding| finding.severity > Severity::Info);
+    (report.explored.states, worse.map(|finding| finding.code).collect())
+}
+
+/// What an event is called in the file of a subsystem is no name that might be exchanged; what the parent has itself may be what a subsystem holds.
+#[test]
+fn what_is_said_to_a_subsystem_and_what_that_holds_is_no_matter_of_names() {
+    let (once, found) = found_on_two(["can2", "can3"], &[]);
+    assert_eq!(found, []);
+    let swapped = [("right/e_ask'", "right/?'"), ("right/e_low'", "right/e_ask'"), ("right/?'", "right/e_low'")];
+    let (both, _) = found_on_two(["can2", "can3"], &swapped);
+    assert!(both > once, "{both} {once}");
+    let (_, found) = found_on_two(["can2", "can1"], &[]);
+    assert!(found.contains(&codes::COMPOSE_EXCLUSIVE), "{found:?}");
 }

@@ -278,6 +278,34 @@ const CASES: &[Case] = &[
         "slow 0.2 stop 0.5 stop 3",
         "",
     ),
+    // What the interrupted one has connected is in its way.
+    (
+        "create: { component: n, type: Motor } }, { create: { component: l, type: Lamp }",
+        [
+            "changes: [{ create: { component: k, type: Lamp } }, { connect: { from: k.o, to: m.ref, policy: data } }, { operation_call: { operation: n.clamp } }]",
+            NOTHING,
+            "changes: [{ connect: { from: l.o, to: m.ref, policy: data } }], post_conf_state: [\"m:stopped\"]",
+            STILL,
+        ],
+        "fault('operation_call n.clamp', 'slow', 1, 0.7)",
+        "slow 0.3 stop 3",
+        "",
+    ),
+    // What the interrupted one has out is done when it comes to the same itself.
+    (
+        N,
+        [DOWN, "changes: [{ property_set: { property: n.limit, value: 0.7 } }]", OTHER, STILL],
+        "fault('configure m', 'slow', 2, 0.8)",
+        "slow 0.2 fast 0.3 stop 5",
+        "",
+    ),
+    (
+        N,
+        [LIMIT_OPEN, "post_conf_state: [\"m:stopped\"]", DOWN, STILL],
+        "fault('stop m', 'slow', 2, 0.8)",
+        "slow 0.2 fast 0.2 stop 5",
+        "",
+    ),
     // What the first press left to the second one, and that did not come to, nobody has done.
     (
         N,
@@ -290,6 +318,31 @@ const CASES: &[Case] = &[
         "fault('port_write n.speed', 'lost', 1) fault('stop m', 'slow', 1, 1.3)",
         "slow 0.2 stop 0.5 stop 5",
         "",
+    ),
+    (
+        LED,
+        [
+            CLAMP,
+            NOTHING,
+            "changes: [{ disconnect: { from: l.o, to: m.ref } }], post_conf_state: [\"m:unconfigured\"]",
+            "changes: [{ port_write: { port: m.speed, value: 0.0 } }], post_conf_state: [\"m:stopped\"]",
+        ],
+        "fault('port_write m.speed', 'slow', 1, 2)",
+        "slow 0.2 halt 0.02 stop 0.1 halt 9",
+        "unclamp",
+    ),
+    // What the first one has made again, taking back, the second one was to destroy, and did not: it is there.
+    (
+        "create: { component: l, type: Lamp } }, { create: { component: x, type: Lamp }",
+        [
+            "changes: [{ destroy: { component: x } }], post_conf_state: [\"m:unconfigured\"]",
+            NOTHING,
+            "changes: [{ destroy: { component: x } }, { port_write: { port: m.speed, value: 0.0 } }]",
+            "changes: [{ operation_call: { operation: m.brake } }]",
+        ],
+        "raise('e_slow') wait(0.2) fault('configure m', 'late', 1) fault('destroy x', 'fail', 1)",
+        "halt 9 stop 1",
+        "brake release",
     ),
     // What the first press was to write is written by the third in its place: the second one gives nothing of it back.
     (
@@ -422,6 +475,103 @@ fn what_is_so_already_counts_as_done() {
             assert_eq!((told.as_slice(), ran.code), (&[held.as_str(), over][..], 0), "{act}: {}{}", ran.out, ran.err);
             assert!(ran.out.contains("stop.ok"), "{act} {slow}: {}", ran.out);
         }
+    }
+}
+
+/// What the interrupted one has connected, has out, or has half taken back, keeps nothing of it from being done: *ok*.
+#[test]
+fn what_is_in_its_way_or_on_its_way_makes_nothing_of_it_broken() {
+    let lamps = "create: { component: n, type: Motor } }, { create: { component: l, type: Lamp }";
+    let led = "create: { component: n, type: Motor } }, { create: { component: l, type: Lamp } }, { connect: { from: l.o, to: m.ref, policy: data }";
+    let connects = "changes: [{ create: { component: k, type: Lamp } }, { connect: { from: k.o, to: m.ref, policy: data } }, { operation_call: { operation: n.clamp } }]";
+    let takes_away = "changes: [{ disconnect: { from: l.o, to: m.ref } }, { destroy: { component: l } }]";
+    let (makes, makes_running) = (
+        "changes: [{ create: { component: k, type: Lamp } }]",
+        "changes: [{ create: { component: k, type: Lamp } }], post_conf_state: [\"k:running\"]",
+    );
+    let writes = "changes: [{ port_write: { port: m.ref, value: 0.0 } }]";
+    let (clamp, fast) = ("'operation_call n.clamp', 'slow', 1, 0.7", "raise('e_fast') wait(0.3)");
+    let cases = [
+        (lamps, [connects, NOTHING, TOGETHER, STILL], clamp, "", "running nil 1", "running nil 0"),
+        (lamps, [connects, NOTHING, writes, STILL], clamp, "", "running nil 0", "running nil 0"),
+        (
+            lamps,
+            [DOWN, LIMIT_OPEN, OTHER, STILL],
+            "'configure m', 'slow', 2, 0.8",
+            fast,
+            "running nil 0",
+            "running nil 0",
+        ),
+        (
+            lamps,
+            [LIMIT_OPEN, "post_conf_state: [\"m:stopped\"]", DOWN, STILL],
+            "'stop m', 'slow', 2, 0.8",
+            fast,
+            "unconfigured nil 0",
+            "running nil 0",
+        ),
+        (
+            led,
+            [takes_away, OTHER, APART, STILL],
+            "'connect l.o', 'slow', 1, 0.8",
+            fast,
+            "running nil 0",
+            "running nil 1",
+        ),
+        (
+            lamps,
+            [makes_running, OTHER, makes, STILL],
+            "'destroy k', 'slow', 1, 0.8",
+            fast,
+            "running unconfigured 0",
+            "running nil 0",
+        ),
+        (
+            lamps,
+            [makes_running, OTHER, makes, STILL],
+            "'cleanup k', 'slow', 1, 0.8",
+            fast,
+            "running unconfigured 0",
+            "running nil 0",
+        ),
+        (
+            lamps,
+            [makes_running, OTHER, makes, STILL],
+            "'start k', 'slow', 1, 0.8",
+            "",
+            "running unconfigured 0",
+            "running nil 0",
+        ),
+    ];
+    for (made, which, fault, more, held, over) in cases {
+        let demo = arm(&chart(), made, &which);
+        // Where it is switched it was applied wholly.
+        let first = if more.is_empty() { 0.3 } else { 1.0 };
+        demo.write(
+            "s.lua",
+            &format!(
+                "local function at()
+                   return state('m') .. ' ' .. tostring(state('k')) .. ' ' .. #system().connections
+                 end
+                 deploy('deployment.yaml') wait(0.2) local slow = {{ {fault} }}
+                 if {first} < 0.5 then fault(table.unpack(slow)) end
+                 raise('e_slow') wait({first}) if {first} > 0.5 then fault(table.unpack(slow)) end
+                 {more} raise('e_stop') wait(4) say('held ' .. at() .. ' ' .. #drift()) raise('e_reset') wait(3)
+                 raise('e_reset') wait(1) say('over ' .. at() .. ' ' .. #stack()) shutdown()"
+            ),
+        );
+        let ran = demo.run(&["run", "s.lua", "--clock", "simulated"]);
+        let told: Vec<&str> =
+            ran.out.lines().filter(|line| line.starts_with("held") || line.starts_with("over")).collect();
+        let (held, over) = (format!("held {held} 0"), format!("over {over} 2"));
+        assert_eq!(
+            (told.as_slice(), ran.code),
+            (&[held.as_str(), &over][..], 0),
+            "{which:?} {fault}: {}{}",
+            ran.out,
+            ran.err
+        );
+        assert!(ran.out.contains("stop.ok"), "{which:?}: {}", ran.out);
     }
 }
 

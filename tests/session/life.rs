@@ -178,6 +178,7 @@ fn a_script_that_fails_leaves_nothing_behind() {
         ("deploy('@generic_arm.yaml') raise('e_5dofs')", "did you mean `e_5dof`?"),
         ("deploy('@generic_arm.yaml') apply('eight_DOFF')", "did you mean `eight_DOF`?"),
         ("deploy('@generic_arm.yaml') wait_answer('e_never', 1)", "`e_never` was not heard in 1 s"),
+        ("deploy('@generic_arm.yaml') wait_answer('e_shutdwon', 1)", "not heard in 1 s (did you mean `e_shutdown`?)"),
         ("deploy('@generic_arm.yaml') wait_answer('eight_DOF.okk', 1)", "is never heard"),
         ("deploy('@generic_arm.yaml') wait_answer('eight_DOF.done', 1)", "`eight_DOF.ok`"),
         ("deploy('@generic_arm.yaml') wait_answer('eight_DOF.okk', 1)", "did you mean `eight_DOF.ok`?"),
