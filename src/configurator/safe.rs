@@ -58,9 +58,10 @@ impl Engine {
         let before = self.world.as_left_by_safe(before);
         let own =
             |earlier: &[Step]| before.as_ref().map(|before| plan_on(configuration, before, &whole, earlier).frame);
-        let rest = own(&earlier)
-            .zip(before.as_ref())
-            .map(|(own, before)| beside_what_is_interrupted(configuration, &own, &stack, (&self.world.system, before)));
+        let now = &self.world.system;
+        let then = with(now, &earlier);
+        let beside = |(own, before)| beside_what_is_interrupted(configuration, &own, &stack, (now, &then, before));
+        let rest = own(&earlier).zip(before.as_ref()).map(beside);
         let rest = rest.as_deref().unwrap_or(configuration);
         let plan = |system: &System, earlier: &[Step]| plan_on(rest, system, &stack, earlier);
         let BestEffort { mut planned, mut frame, troubles } = plan(&self.world.system, &earlier);

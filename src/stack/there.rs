@@ -33,13 +33,13 @@ pub(super) fn of_what_is_there<'c>(system: &impl View, configuration: &'c Config
 }
 
 /// What is to be done for a safe configuration beside what it interrupts, whose doing is not `before`: an act that its `frame` tells of, and that is so in
-/// the `system` already, is left to it, but for what is still to be taken back of those whose place it takes on this `stack`; what drives an in-port that
+/// the `system` already, as it is `then` (when those that came before are over), is left to it, but for what is still to be taken back of those whose place it takes on this `stack`; what drives an in-port that
 /// it connects or writes is disconnected.
 pub fn beside_what_is_interrupted<'c>(
     configuration: &'c Configuration,
     frame: &Frame,
     stack: &Stack,
-    (system, before): (&System, &System),
+    (system, then, before): (&System, &System, &System),
 ) -> Cow<'c, Configuration> {
     let replaced = |frame: &&Arc<Frame>| frame.group.is_some() && frame.group == configuration.group && !frame.safe;
     let replaced = stack.frames().iter().filter(replaced);
@@ -59,7 +59,7 @@ pub fn beside_what_is_interrupted<'c>(
             _ => false,
         })
     };
-    let is_so = |change: &Change| is_done(&change.kind, system) && is_own(&change.kind) && stays(&change.kind);
+    let is_so = |change: &Change| is_done(&change.kind, then) && is_own(&change.kind) && stays(&change.kind);
     let mut driving: Vec<Change> = Vec::new();
     for change in configuration.changes.iter().filter(|change| !is_so(change)) {
         let (port, beside) = match &change.kind {

@@ -278,6 +278,19 @@ const CASES: &[Case] = &[
         "slow 0.2 stop 0.5 stop 3",
         "",
     ),
+    // Two at one instant, the first of which connects again, taking back, what the second one is to cut.
+    (
+        LED,
+        [
+            APART,
+            "changes: [{ disconnect: { from: l.o, to: m.ref } }, { destroy: { component: l } }]",
+            "changes: [{ disconnect: { from: l.o, to: m.ref } }, { destroy: { component: l } }]",
+            LIMIT,
+        ],
+        "raise('e_slow') wait(0.2) fault('destroy l', 'slow', 1, 0.8)",
+        "fast 0.3 halt 0 stop 5",
+        "",
+    ),
     // What the interrupted one has connected is in its way.
     (
         "create: { component: n, type: Motor } }, { create: { component: l, type: Lamp }",
