@@ -271,7 +271,10 @@ pub(super) fn owed_no_more(
         let (mut rest, mut owes) = (list(&other), (*other.owes).clone());
         let done: Vec<DraftStep> = {
             let mut was_done = |item: &&DraftStep| {
-                let counts = other.safe || item.takes_back_call().is_some();
+                // What its own frame takes back again is no matter of this one.
+                let again = || kept.iter().any(|of| undoes(of, &item.step));
+                let counts =
+                    other.safe || item.takes_back_call().is_some() || absolute(&item.step).is_none() && !again();
                 let at = left.iter().position(|step| counts && **step == item.step);
                 at.map(|at| left.remove(at)).is_some()
             };

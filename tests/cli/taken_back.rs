@@ -291,6 +291,19 @@ const CASES: &[Case] = &[
         "fast 0.3 halt 0 stop 5",
         "",
     ),
+    // What it has taken back is taken back also where it interrupts, and something else of that is lost.
+    (
+        LED,
+        [
+            "changes: [{ disconnect: { from: l.o, to: m.ref } }], post_conf_state: [\"m:unconfigured\"]",
+            "changes: [{ property_set: { property: n.limit, value: 0.7 } }]",
+            BRAKE,
+            LIMIT,
+        ],
+        "raise('e_slow') wait(0.2) fault('configure m', 'lost', 1) fault('connect l.o', 'lost', 1)",
+        "fast 0.05 stop 9",
+        "brake release",
+    ),
     // What the interrupted one has connected is in its way.
     (
         "create: { component: n, type: Motor } }, { create: { component: l, type: Lamp }",
