@@ -296,7 +296,7 @@ const CASES: &[Case] = &[
         LED,
         [
             "changes: [{ disconnect: { from: l.o, to: m.ref } }], post_conf_state: [\"m:unconfigured\"]",
-            "changes: [{ property_set: { property: n.limit, value: 0.7 } }]",
+            LIMIT_OPEN,
             BRAKE,
             LIMIT,
         ],
