@@ -34,4 +34,4 @@ each(function(robot) raise(robot .. "/e_reset") end)
 each(function(robot) wait_state(robot .. ":operational", 5) end)
 
 shutdown()
-say("four couplings, eight robots: up, stopped one by one and all at once, down")
+say("four couplings, eight robots: up, one coupling stopped alone, then all at once, down")

@@ -6,7 +6,7 @@
 //! begins when by the [`Desk`]. The configurator carries out what these say, `check` follows what these say.
 //!
 //! * [`request`], [`answer`]: what is asked and answered. `work`: requests become one plan. `batch`: what the requests of a
-//!   batch come to. `settle`: what comes of them when they have ended. `effort`: what a safe configuration does. `leave`: what a coordinator that leads down takes along. `mend`: what is broken, brought back, in one net with the undo that asks for it. `desk`, [`claims`]: who waits for whom. `world`: system, stack and what is broken, as one. `prepared`: plans that are carried out again. `pushes`: plans that are not made again.
+//!   batch come to. `settle`: what comes of them when they have ended. `effort`: what a safe configuration does; `there`: of what it names, what is there to be done, also beside what it interrupts. `leave`: what a coordinator that leads down takes along. `mend`: what is broken, brought back, in one net with the undo that asks for it. `desk`, [`claims`]: who waits for whom. `world`: system, stack and what is broken, as one. `prepared`: plans that are carried out again. `pushes`: plans that are not made again.
 //! * `share`: what keeps a frame from being undone. `squash`: the bound. `stands`: when what a configuration stands for is watched no more. `net`: fewer steps to the same system.
 
 pub mod answer;
