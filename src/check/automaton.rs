@@ -66,6 +66,7 @@ impl InterfaceAutomaton {
     }
 
     /// How many states it has.
+    #[cfg(test)]
     pub fn len(&self) -> usize {
         self.edges.len()
     }

@@ -59,8 +59,6 @@ pub struct Beliefs {
     raised: FxHashMap<(u32, u8), (u32, bool)>,
     /// Something was raised where so many events may lie in its inbox already that one more was not followed there.
     filled: bool,
-    /// In which states of the automaton it tells nothing more by itself, though it is not down and nothing has failed.
-    rests: Vec<bool>,
 }
 
 impl Beliefs {
@@ -78,7 +76,6 @@ impl Beliefs {
         let (sets, tells, raised) = (IndexSet::default(), FxHashMap::default(), FxHashMap::default());
         let possible = IndexSet::default();
         let (silent, met, making) = (Vec::new(), Vec::new(), 0);
-        let rests = resting(&automaton, &heard, &others);
         let mut beliefs = Self {
             automaton,
             most_untaken,
@@ -93,7 +90,6 @@ impl Beliefs {
             tells,
             raised,
             filled: false,
-            rests,
         };
         beliefs.of([(start, [0; MOST_UNTAKEN])], None);
         beliefs
@@ -109,9 +105,29 @@ impl Beliefs {
         self.filled
     }
 
-    /// Whether it may be where it has taken everything, and tells nothing until something is raised for it.
-    pub fn may_rest(&self, belief: u32) -> bool {
-        self.all_of(belief).any(|(state, untaken)| untaken[0] == 0 && self.rests[state as usize])
+    /// The states of its automaton in which it may be where it has taken everything, is not down, and nothing has failed.
+    pub fn may_wait_in(&self, belief: u32) -> impl Iterator<Item = u32> + '_ {
+        let waits = |(state, untaken): Possible| {
+            let of = self.automaton.state(state);
+            (untaken[0] == 0 && !of.down && !of.failed).then_some(state)
+        };
+        self.all_of(belief).filter_map(waits)
+    }
+
+    /// What leads on from a state of its automaton without its parent: to where, and what is told of that, if the parent waits for it somewhere.
+    pub fn goes_on(&self, state: u32) -> impl Iterator<Item = (Option<EventName>, u32)> + '_ {
+        self.automaton.leads(state).iter().filter_map(|(by, to)| match by {
+            InterfaceAction::Tells(event, _) => Some((Some(*event).filter(|event| self.heard.contains(event)), *to)),
+            InterfaceAction::Takes { event, .. } if !self.others.contains(event) => None,
+            InterfaceAction::Takes { .. } | InterfaceAction::Silent => Some((None, *to)),
+        })
+    }
+
+    /// Whether it is down wherever it may be, and nothing lies untaken that begins it.
+    pub fn is_down(&self, belief: u32, begins: &str) -> bool {
+        let takes = |place: u8| self.takes.get(usize::from(place).wrapping_sub(1));
+        let begins = |place: &u8| takes(*place).is_some_and(|(event, _)| event.as_str() == begins);
+        self.all_of(belief).all(|(state, untaken)| self.automaton.state(state).down && !untaken.iter().any(begins))
     }
 
     /// What it may tell now.
@@ -180,6 +196,13 @@ impl Beliefs {
         let known = (self.of(after, repeated), lost);
         self.raised.insert((belief, number), known);
         known
+    }
+
+    /// Whether, when it has told an event there, and nothing was raised for it since, that may be known.
+    pub fn may_be_after(&self, belief: u32, event: EventName, then: u32) -> bool {
+        self.tells
+            .get(&belief)
+            .is_some_and(|tells| tells.iter().any(|(told, _, known)| *told == event && *known == then))
     }
 
     /// The possible things that a belief has.
@@ -255,32 +278,6 @@ impl Beliefs {
         }
         all
     }
-}
-
-/// The states in which nothing that is heard is told, nor in any that it gets to from there by itself, or by what `others` raise.
-fn resting(automaton: &InterfaceAutomaton, heard: &BTreeSet<EventName>, others: &BTreeSet<EventName>) -> Vec<bool> {
-    let mut tells = vec![false; automaton.len()];
-    let mut before: Vec<Vec<u32>> = vec![Vec::new(); automaton.len()];
-    let mut open: Vec<u32> = Vec::new();
-    for at in (0u32..).take(automaton.len()) {
-        for (by, to) in automaton.leads(at) {
-            match by {
-                InterfaceAction::Tells(event, _) if heard.contains(event) => open.push(at),
-                InterfaceAction::Takes { event, .. } if !others.contains(event) => {}
-                _ => before[*to as usize].push(at),
-            }
-        }
-    }
-    while let Some(at) = open.pop() {
-        if !std::mem::replace(&mut tells[at as usize], true) {
-            open.extend(&before[at as usize]);
-        }
-    }
-    let of = |(at, tells): (u32, bool)| {
-        let state = automaton.state(at);
-        !tells && !state.down && !state.failed
-    };
-    (0u32..).zip(tells).map(of).collect()
 }
 
 /// Whether an event is told where so much is still to be taken: that it is down is seen where it rests, and what lies before it then comes to

@@ -75,6 +75,8 @@ pub enum Bound {
     Forgotten,
     /// [`MOST_UNTAKEN`](super::belief::MOST_UNTAKEN).
     Untaken,
+    /// [`limits::CHECK_VAIN`]: whether what a subsystem tells from each of its states leads its parent on.
+    Vain,
     /// [`limits::CHECK_DRIVEN`]: how long a way up or down lasts.
     Times,
     /// Times that count from when a coordinator began.
@@ -186,6 +188,9 @@ impl Bound {
                 format!("{TOLD}, for with that there are more than {} transitions (`--budget`)", effort.believed())
             }
             Self::Untaken => format!("more than {MOST_UNTAKEN} events that a subsystem has not taken yet were not followed"),
+            Self::Vain => {
+                "whether a parent is led down wherever a subsystem may have been led by something else was not followed to the end".to_owned()
+            }
             Self::Entered => "a coordinator could not be entered".to_owned(),
             Self::Clocked => "when times that count from the beginning of the coordinator (`e_at`) are over was not followed: at once, each time \
                               that such a state is entered late, or later than there is time for (`e_after` counts from the state)"

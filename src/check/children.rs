@@ -64,6 +64,13 @@ impl Child {
         self.ignores == Some(name) && self.knows_ignored()
     }
 
+    /// Whether this event says that it ignored the event that ends it, and it is known to be down by what it has told so far.
+    pub fn is_known_down(&self, name: EventName, belief: u32) -> bool {
+        let begins = || self.begins.local(self.path).unwrap_or_default();
+        let ignored = || name.as_str().strip_suffix(IGNORED) == Some(self.ends.as_str());
+        self.beliefs.as_ref().is_some_and(|beliefs| ignored() && beliefs.is_down(belief, begins()))
+    }
+
     /// The subsystems of a file, as its coordinators know them.
     pub fn all(deployment: &Deployment) -> Vec<Self> {
         let of = |subsystem: &Subsystem| {
@@ -81,10 +88,12 @@ impl Child {
             let (up, beliefs) = (SubsystemStanding::Up.event(path), None);
             let (ends, ends_unbegun) = (own.shutdown.event.within(path), ends_unbegun(own));
             let ignores = EventName::new(&format!("{ends}{IGNORED}")).ok();
-            let ignores = ignores.filter(|_| until == ends && own.subsystems.is_empty());
+            let ignores = ignores.filter(|_| own.subsystems.is_empty());
             let at_first = ignores.and_then(|_| deaf(own, false));
-            let deaf_once_ended = at_first.is_none();
+            let is_first = at_first.is_some();
             let deaf = at_first.or_else(|| ignores.and_then(|_| deaf(own, true)));
+            // That it was ended is kept as that it was let go: of one that leaves it is not known.
+            let deaf_once_ended = !is_first && (until == ends || deaf.is_none());
             let uncertain = uncertain_events(own).into_iter().map(|event| event.within(path)).collect();
             Self {
                 path,

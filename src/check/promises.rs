@@ -15,18 +15,21 @@ use crate::statechart::{EventId, NodeId};
 use rustc_hash::FxHashMap;
 use std::collections::BTreeMap;
 
-/// Whether that a subsystem ignores the event that ends it says that it is down: it was ended once since it was begun, and nothing of before
-/// may be told yet.
-fn is_over(state: &ProductState, at: usize) -> bool {
+/// Whether that a subsystem ignores the event that ends it says that it is down: it ignores that nowhere else, or was ended once since it was begun; and
+/// nothing of before may be told yet.
+fn is_over(state: &ProductState, child: &Child, at: usize) -> bool {
     let ended = state.children & (begun(at) | promised(at) | released(at));
-    state.children & MIXED == 0 && ended == begun(at) | released(at) || state.children & begun(at) == 0
+    let once = child.deaf.is_none() || ended == begun(at) | released(at);
+    state.children & MIXED == 0 && once || state.children & begun(at) == 0
 }
 
 /// The event that begins, or ends, a subsystem is raised: kept in what else cannot be of one. It is *released* and *promised* where that was
 /// raised once more since it was ended, and *released* though not begun where it was ended so.
-fn raised_anew(state: &mut ProductState, at: usize, begins: bool, ends: bool) {
+fn raised_anew(state: &mut ProductState, child: &Child, at: usize, begins: bool, ends: bool) {
     let (is_begun, is_released) = (state.children & begun(at) != 0, state.children & released(at) != 0);
     match (is_begun, is_released) {
+        // Where it is deaf nowhere, only what is ignored in another life makes a difference.
+        (true, _) if child.deaf.is_none() => state.children |= if begins { MIXED } else { 0 },
         (true, true) if begins || ends => state.children |= promised(at),
         (false, false) if ends => state.children = state.children & !promised(at) | released(at),
         // What is ignored of that may be told in the life that begins.
@@ -47,7 +50,10 @@ impl Product<'_> {
                 if state.children & released(at) == 0 {
                     state.children |= promised(at);
                 }
-            } else if name == child.down || child.is_down_by(name) && (child.deaf.is_none() || is_over(state, at)) {
+            } else if name == child.down
+                || child.is_down_by(name) && is_over(state, child, at)
+                || child.is_known_down(name, state.beliefs.get(at).copied().unwrap_or_default())
+            {
                 state.children &= !(promised(at) | begun(at) | released(at));
             }
         }
@@ -66,8 +72,8 @@ impl Product<'_> {
                     state.told.push(name);
                 }
             }
-            if child.knows_ignored() && child.deaf.is_some() {
-                raised_anew(state, at, name == child.begins, name == child.ends);
+            if child.knows_ignored() {
+                raised_anew(state, child, at, name == child.begins, name == child.ends);
             }
             if name == child.begins {
                 if state.children & begun(at) != 0 && !child.holds.is_empty() {

@@ -78,6 +78,8 @@ pub(super) struct Engine {
     pub returned: CameBack,
     /// What partial frames are left of.
     pub partials: Vec<(FrameId, Arc<super::request::Residual>)>,
+    /// It was told last that something is broken, or in part in force.
+    pub told_broken: bool,
     /// Plans that are carried out again, at most so many of each configuration, the one used last at the end.
     pub switches: FxHashMap<ConfigId, Vec<Fast>>,
     pub confirmations: Confirmations,
@@ -126,6 +128,7 @@ impl Engine {
             suspects: Suspects::default(),
             returned: CameBack::Nobody,
             partials: Vec::new(),
+            told_broken: false,
             switches: FxHashMap::default(),
             confirmations: Confirmations::default(),
             down: BTreeSet::new(),
@@ -159,6 +162,7 @@ impl Engine {
             if let Some(payload) = self.listener.take() {
                 resume_unwind(payload);
             }
+            self.tell_broken();
             if let Some(command) = self.commands.pop_front() {
                 self.counts.command_taken(command.only_asks());
                 self.queued(command);
@@ -461,6 +465,19 @@ impl Engine {
         self.partials.retain(|(frame, _)| stack.frame(*frame).is_some_and(|frame| frame.partial));
         let broken = self.world.broken.first().map(|broken| &broken.residual);
         broken.or(self.in_part().next().map(|(_, residual)| residual)).cloned()
+    }
+
+    /// Tells that something is broken now, or nothing any more.
+    pub(super) fn tell_broken(&mut self) {
+        if self.world.broken.is_empty() && self.partials.is_empty() && !self.told_broken {
+            return;
+        }
+        let broken = self.broken_longest().is_some();
+        if std::mem::replace(&mut self.told_broken, broken) != broken
+            && let Some(progress) = &self.given.progress
+        {
+            progress(&Progress::Broken(broken));
+        }
     }
 
     /// What partial frames hold that nothing else tells of.

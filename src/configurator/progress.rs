@@ -110,6 +110,8 @@ pub enum Progress {
     Emptied(Ident),
     /// A later look at the platform shows otherwise what nothing was under way with.
     Differs(Arc<Residual>),
+    /// Something is broken now, or only in part in force; or nothing is any more.
+    Broken(bool),
     /// Something broken is right again.
     Recovered,
     /// It was tried, and something still is not.

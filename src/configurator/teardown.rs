@@ -25,6 +25,8 @@ impl Engine {
             }
             QueuedCommand::Recover { direction, reply } => {
                 let outcome = self.recover(direction);
+                // Who waits for the answer may look then.
+                self.tell_broken();
                 let _ = reply.try_send(outcome);
             }
             QueuedCommand::TakeBack { deadline, reply } => {

@@ -13,6 +13,10 @@ pub const CHECK_BELIEVED: usize = 300_000;
 /// made of them, or an eighth of `--budget`. One with more may tell anything in any order.
 pub const CHECK_PLACES: usize = 100_000;
 
+/// States of a parent, each with one in which a subsystem may be there, that are looked at for whether what that one tells leads down: they take some
+/// 30 bytes each.
+pub const CHECK_VAIN: usize = 1_000_000;
+
 /// The largest number of transitions that `--budget` takes, and of states.
 pub const CHECK_TRANSITIONS_MOST: usize = 1_000_000_000;
 

@@ -53,8 +53,8 @@ pub struct Hub {
 
 pub(super) struct HubState {
     phase: Phase,
-    /// How often somebody has begun to look what the phase is.
-    looks: u64,
+    /// Something is broken, as the configurator has told.
+    broken: bool,
     next: u64,
     outstanding: FxHashMap<RequestId, Outstanding>,
     faults: Vec<ComponentFault>,
@@ -76,6 +76,13 @@ pub(super) struct HubState {
     /// By coordinator: what its states are written with (`arm:`, or nothing), and its active ones.
     pub(super) active: BTreeMap<String, Vec<String>>,
     pub(super) epoch: u64,
+}
+
+impl HubState {
+    /// What is up and has something broken is *broken*.
+    fn phase(&self) -> Phase {
+        if self.phase == Phase::Up && self.broken { Phase::Broken } else { self.phase }
+    }
 }
 
 /// A request that is not answered yet.
@@ -112,7 +119,7 @@ impl Hub {
             real: Clock::real(),
             state: Mutex::new(HubState {
                 phase: Phase::Down,
-                looks: 0,
+                broken: false,
                 next: 1,
                 outstanding: FxHashMap::default(),
                 faults: Vec::new(),
@@ -337,33 +344,30 @@ impl Hub {
             .collect()
     }
 
-    /// The phase.
+    /// The phase: what is up and has something broken is *broken*.
     pub fn phase(&self) -> Phase {
-        self.lock().phase
+        self.lock().phase()
     }
 
-    /// Sets the phase.
+    /// Sets the phase. That it is up is told also where something is broken then.
     pub fn set_phase(&self, phase: Phase) {
-        let was = std::mem::replace(&mut self.lock().phase, phase);
-        if was != phase {
-            self.note(Happening::Phase { phase });
-        }
+        let mut state = self.lock();
+        let was = state.phase();
+        state.phase = phase;
+        let now = state.phase();
+        drop(state);
+        let changed = [phase, now].into_iter().skip(usize::from(phase == now)).filter(|phase| *phase != was);
+        changed.for_each(|phase| self.note(Happening::Phase { phase }));
     }
 
-    /// Somebody begins to look what the phase is: the number of that look.
-    pub fn look(&self) -> u64 {
+    /// Something is broken now, or nothing any more.
+    pub fn broken(&self, broken: bool) {
         let mut state = self.lock();
-        state.looks += 1;
-        state.looks
-    }
-
-    /// The phase that `was` is another one now, as a look has seen it; nothing where it is no longer that, or somebody has begun to look since:
-    /// what was seen may be over.
-    pub fn seen_as(&self, look: u64, was: Phase, phase: Phase) {
-        let mut state = self.lock();
-        if (state.looks, state.phase) == (look, was) {
-            state.phase = phase;
-            drop(state);
+        let was = state.phase();
+        state.broken = broken;
+        let phase = state.phase();
+        drop(state);
+        if phase != was {
             self.note(Happening::Phase { phase });
         }
     }

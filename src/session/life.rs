@@ -160,7 +160,6 @@ impl Session {
             if !self.leads() {
                 return Command::Shutdown { force: false };
             }
-            self.refresh_phase();
             self.tell_slow();
             self.hub().changed.wait(self.next_look(Time::NEVER));
         }
@@ -188,7 +187,12 @@ impl Session {
     /// Where it is in its life, as people are shown it, and what is left where its coordinators are down and something is there all the
     /// same (what was found was accepted as it is): that is not *down*.
     pub(super) fn phase_of(&self, broken: bool, system: Option<&Snapshot>) -> (Phase, Vec<String>) {
-        let phase = match self.hub().phase() {
+        // What was broken may be right again, and that not told yet.
+        let told = match self.hub().phase() {
+            Phase::Broken if !broken && self.ended().is_none() => Phase::Up,
+            told => told,
+        };
+        let phase = match told {
             Phase::Up | Phase::Deploying if broken => Phase::Broken,
             // Its coordinator leads down, whoever raised the event: nobody stops it for that.
             Phase::Up if self.configurator().is_leaving() => Phase::ShuttingDown,

@@ -161,7 +161,6 @@ impl Session {
         let asked = Happening::Requested { request: None, ask: format!("recover --{how}"), by: by.to_owned() };
         self.hub().note(asked.clone());
         let ended = self.configurator().recover(how, deadline)?;
-        self.refresh_phase();
         // Or it was found to be when it was looked at.
         let was_broken = was_broken || ended != Ok(false);
         let residual = ended.err();

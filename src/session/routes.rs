@@ -189,7 +189,7 @@ impl Listener for ToConfigurator {
                         from: "configurator".to_owned(),
                         safety: false,
                     });
-                    self.deliver(Incoming::new(Class::Notice, event).tagged(Some(Tag::from(*raised))));
+                    self.deliver(Incoming::new(Class::Reply, event).tagged(Some(Tag::from(*raised))));
                 }
                 Meaning::Unknown(name) => self.hub.note(Happening::Noted {
                     note: format!("`{name}` was raised: no configuration, and not declared under `emits`"),
@@ -327,7 +327,7 @@ impl ToConfigurator {
         let reason = Some(Arc::new(Reason::Unheard));
         let verdict = request.ask.failed();
         let answer = Answer { request, verdict, at: self.hub.now(), took: Duration::ZERO, reason };
-        give(&self.hub, &junction, &answer, Vec::new(), Class::Notice);
+        give(&self.hub, &junction, &answer, Vec::new(), Class::Reply);
     }
 
     /// What one coordinator emits is an event of the others that wait for it somewhere. It is a report, so that two
@@ -391,6 +391,7 @@ pub(super) fn on_progress(hub: &Hub, junction: &Junction, steps: &Steps, progres
             }
         }
         Progress::Differs(residual) => hub.note(Happening::Noted { note: residual.cause.to_string() }),
+        Progress::Broken(broken) => hub.broken(*broken),
         Progress::Recovered => {
             hub.note(Happening::Recovered { steps: steps.take(RequestId(0)) });
         }

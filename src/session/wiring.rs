@@ -380,21 +380,6 @@ impl Session {
         deadline.min(self.clock.now() + limits::REACTION_LONG)
     }
 
-    /// Follows the configurator into *broken* and back.
-    pub(super) fn refresh_phase(&self) {
-        // Not known: as it was. What was looked at may be over when it is told: then it is looked once more.
-        loop {
-            let look = self.hub.look();
-            let Ok(view) = self.view(false) else { return };
-            // What somebody has seen before does not count after what somebody else has seen since.
-            match (self.hub.phase(), view.is_some_and(|view| view.broken.is_some())) {
-                (Phase::Up, true) => self.hub.seen_as(look, Phase::Up, Phase::Broken),
-                (Phase::Broken, false) => self.hub.seen_as(look, Phase::Broken, Phase::Up),
-                _ => return,
-            }
-        }
-    }
-
     /// Each coordinator's active states, root to leaf, by its name.
     fn active(&self) -> BTreeMap<String, Vec<String>> {
         self.parts.iter().map(|part| (part.name.to_string(), part.coordinator.active())).collect()

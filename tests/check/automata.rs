@@ -277,6 +277,7 @@ configurations: [child_conf.lua]
 coordinator: child.lua
 deploy: { event: e_start, up: on, failed: [failed], within_s: 5 }
 shutdown: { event: e_end, down: idle, within_s: 5, rest: [halt] }
+emits: [e_note]
 safety: [e_stop]
 ";
     let conf = "ConfiguratorConf { make = Configuration { create('M', 'Motor'), post_conf_state = { 'M:running' } },
@@ -344,4 +345,10 @@ safety: [e_stop]
         [""; 0]
     );
     assert_eq!(in_vain(", 'e_after(1)'", ""), [""; 0]);
+    // It may still tell something, which is heard elsewhere.
+    let notes = "} }, trans { src = 'held', tgt = 'held', effect = 'e_note', events = { 'e_reset'";
+    let says = in_vain(notes, "trans { src = 'on', tgt = 'on', events = { 's/e_note' } },");
+    assert!(says.len() == 1 && says[0].contains("root.lowering"), "{says:?}");
+    let ends = "trans { src = 'lowering', tgt = 'lowering', events = { 's/e_note' }, effect = 's/e_end' },";
+    assert_eq!(in_vain(notes, ends), [""; 0]);
 }

@@ -76,14 +76,20 @@ coordinator:
 
 fn checked(coordinator: String, transitions: usize) -> Report {
     let files = [
-        ("pod.yaml", POD.to_owned()),
-        ("pod_conf.yaml", POD_CONF.to_owned()),
-        ("pod_coord.yaml", POD_COORDINATOR.to_owned()),
-        ("two.yaml", TWO.to_owned()),
-        ("two_conf.yaml", "configurations: {}\n".to_owned()),
-        ("two_coord.yaml", coordinator),
+        ("pod.yaml", POD),
+        ("pod_conf.yaml", POD_CONF),
+        ("pod_coord.yaml", POD_COORDINATOR),
+        ("two.yaml", TWO),
+        ("two_conf.yaml", "configurations: {}\n"),
+        ("two_coord.yaml", &coordinator),
     ];
-    let deployment = load(&Sources::memory(files), "two.yaml", &[]).deployment.expect("it can be read");
+    of_files(files, transitions)
+}
+
+fn of_files(files: [(&str, &str); 6], transitions: usize) -> Report {
+    let deployment = load(&Sources::memory(files.map(|(name, text)| (name, text.to_owned()))), "two.yaml", &[])
+        .deployment
+        .expect("it can be read");
     let catalogue = catalogue(&deployment);
     check::run_with(deployment, &catalogue, Effort { transitions, ..Effort::default() })
 }
@@ -116,4 +122,126 @@ fn that_one_was_down_before_anybody_waited_for_it_is_told_where_there_is_too_muc
     let report = checked(hears, 800_000);
     assert_eq!(said(&report, "coord::no_way_down"), []);
     assert!(matches!(report.verdict, CheckVerdict::Followed { .. }), "{:#?}", report.findings);
+}
+
+/// It says that it wants to leave, and waits until it is let go.
+const LEAVING_POD: &str = "
+davit: 1
+name: pod
+platform: simulated
+types: { Esc: { properties: { gain: { type: float, default: 1.0 } } } }
+configurations: [pod_conf.yaml]
+coordinator: pod_coord.yaml
+exports: { properties: { gain: esc.gain } }
+accepts: [e_released]
+emits: [e_leaving]
+leaving: { says: e_leaving, until: e_released }
+deploy: { event: e_on, up: on, failed: [failed], within_s: 3 }
+shutdown: { event: e_off, down: off, within_s: 3 }
+";
+
+const LEAVING_POD_CONF: &str = "
+configurations:
+  make: { changes: [{ create: { component: esc, type: Esc } }], post_conf_state: [esc:running] }
+";
+
+const LEAVING_POD_COORDINATOR: &str = "
+coordinator:
+  states:
+    off: {}
+    alive:
+      states: { making: { entry: make }, on: {}, failed: {}, leaving: { entry: e_leaving }, removing: { entry: make.undo } }
+      transitions:
+        - { src: initial, tgt: making }
+        - { src: making, tgt: on, events: [make.ok] }
+        - { src: making, tgt: failed, events: [make.failed, make.broken] }
+        - { src: leaving, tgt: removing, events: [e_released] }
+        - { src: removing, tgt: failed, events: [make.undo.failed, make.undo.broken] }
+  transitions:
+    - { src: initial, tgt: off }
+    - { src: off, tgt: alive, events: [e_on] }
+    - { src: alive, tgt: .alive.leaving, events: [e_off] }
+    - { src: alive, tgt: off, events: [make.undone] }
+";
+
+const JOINED: &str = "
+davit: 1
+name: two
+platform: simulated
+types: { Lamp: {} }
+subsystems: { port: { deployment: pod.yaml }, star: { deployment: pod.yaml } }
+configurations: [two_conf.yaml]
+coordinator: two_coord.yaml
+deploy: { event: e_start, up: ready, failed: [failed], within_s: 5 }
+shutdown: { event: e_end, down: off, within_s: 20 }
+";
+
+const JOINED_CONF: &str = "
+configurations:
+  join: { changes: [{ property_set: { property: port.gain, value: 2.0 } }, { property_set: { property: star.gain, value: 3.0 } }] }
+";
+
+/// It leads down what it has begun, or not, as `docs/composition.md` says.
+const JOINED_COORDINATOR: &str = "
+coordinator:
+  states:
+    off: {}
+    alive:
+      states:
+        raising: { entry: [port/e_on, star/e_on] }
+        one: {}
+        two: {}
+        joining: { entry: join }
+        ready: {}
+      transitions:
+        - { src: initial, tgt: raising }
+        - { src: raising, tgt: one, events: [port/up] }
+        - { src: raising, tgt: two, events: [star/up] }
+        - { src: one, tgt: joining, events: [star/up] }
+        - { src: two, tgt: joining, events: [port/up] }
+        - { src: joining, tgt: ready, events: [join.ok] }
+    failed: {}
+    down:
+      states:
+        parting: { entry: join.undo }
+        lowering: { entry: [port/e_off, star/e_off, port/e_released, star/e_released] }
+        three: {}
+        four: {}
+      transitions:
+        - { src: initial, tgt: parting }
+        - { src: parting, tgt: lowering, events: [join.undone, join.undo.failed, join.undo.broken] }
+        - { src: lowering, tgt: three, events: [port/down, port/e_off.ignored] }
+        - { src: lowering, tgt: four, events: [star/down, star/e_off.ignored] }
+  transitions:
+    - { src: initial, tgt: off }
+    - { src: off, tgt: alive, events: [e_start] }
+    - { src: alive, tgt: failed, events: [port/failed, star/failed, join.failed, join.broken] }
+    - { src: alive, tgt: down, events: [port/e_leaving, star/e_leaving] }
+    - { src: alive, tgt: down, events: [e_end] }
+    - { src: failed, tgt: down, events: [e_end] }
+    - { src: .down.three, tgt: off, events: [star/down, star/e_off.ignored] }
+    - { src: .down.four, tgt: off, events: [port/down, port/e_off.ignored] }
+";
+
+#[test]
+fn that_one_which_leaves_ignored_its_end_says_that_it_is_down_where_there_is_too_much_of_it() {
+    let checked = |pod: &str| {
+        let files = [
+            ("pod.yaml", LEAVING_POD),
+            ("pod_conf.yaml", LEAVING_POD_CONF),
+            ("pod_coord.yaml", pod),
+            ("two.yaml", JOINED),
+            ("two_conf.yaml", JOINED_CONF),
+            ("two_coord.yaml", JOINED_COORDINATOR),
+        ];
+        let report = of_files(files, 2_500);
+        assert!(report.left.iter().any(|bound| bound.contains("in which order subsystems")), "{:#?}", report.left);
+        report
+    };
+    let report = checked(LEAVING_POD_COORDINATOR);
+    assert!(matches!(report.verdict, CheckVerdict::Followed { .. }), "{:#?}", report.findings);
+    // One that ignores it in another state as well does not say that.
+    let deaf =
+        LEAVING_POD_COORDINATOR.replace("src: alive, tgt: .alive.leaving", "src: .alive.on, tgt: .alive.leaving");
+    assert!(!said(&checked(&deaf), "compose::promise").is_empty());
 }

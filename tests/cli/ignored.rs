@@ -46,3 +46,20 @@ fn a_plan_tells_a_parent_what_its_subsystem_ignored() {
     let down = demo.run(&["plan", "cell.yaml", "--shutdown"]);
     assert!(down.code == 1 && down.err.contains("stops at `cell:root.lowering`"), "{}{}", down.out, down.err);
 }
+
+/// What is raised twice is answered twice, also within one step.
+#[test]
+fn each_event_that_is_ignored_is_answered() {
+    let twice = COORDINATOR.replace(
+        r#"trans { src = "lowering", tgt = "idle", events = { "duo/down" } },"#,
+        r#"first = state {}, second = state {},
+  trans { src = "lowering", tgt = "first", events = { "duo/down" }, effect = { "duo/e_shutdown", "duo/e_shutdown" } },
+  trans { src = "first", tgt = "second", events = { "duo/e_shutdown.ignored" } },
+  trans { src = "second", tgt = "idle", events = { "duo/e_shutdown.ignored" } },"#,
+    );
+    let demo = cell();
+    demo.write("cell_coordinator.lua", &twice);
+    demo.write("story.lua", r#"deploy("cell.yaml") shutdown()"#);
+    let ran = demo.run(&["run", "story.lua", "--clock", "simulated"]);
+    assert!(ran.code == 0 && ran.out.contains("cell:root.second"), "{}{}", ran.out, ran.err);
+}
