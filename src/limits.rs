@@ -43,8 +43,12 @@ pub const SOCKET_CONNECTIONS: usize = 32;
 /// people who ask at the same time, and two that are still being told that they are too many.
 pub const SOCKET_KEPT: usize = 4;
 
-/// Descriptors that stay free beside all connections: what a deployment opens for a moment (its log, a snapshot, a folder that is read).
-pub const SOCKET_SPARE: usize = 6;
+/// Bytes of a name up to which it is compared with those that are known, for *did you mean*.
+pub const NEAR_NAME: usize = 512;
+
+/// Descriptors that stay free beside all connections: what a deployment opens since (its log, its record) and for a moment (a snapshot, a folder
+/// that is read).
+pub const SOCKET_SPARE: usize = 12;
 
 /// How many of these one process may have at a time: one that asks again and again takes none from the others.
 pub const SOCKET_KEPT_EACH: usize = 1;

@@ -5,8 +5,9 @@ use super::input::{Parameters, is_deployment, unread};
 use super::{CommandContext, CommandFailure, CommandResult, Run, write_output};
 use crate::diagnostics::Language;
 use crate::lang::{self, LoadOptions, Sources};
-use crate::model::Finding;
 use crate::model::codes::{CONVERT_FUNCTIONS, CONVERT_SUBSYSTEMS};
+use crate::model::{Finding, Findings, Statechart};
+use crate::statechart::compile;
 use std::path::PathBuf;
 
 /// Write the same model in another language.
@@ -64,6 +65,9 @@ impl Run for Args {
                     "convert their files, and the files of configurations and the coordinator that this one names";
                 return Err(CommandFailure::no(CONVERT_SUBSYSTEMS, message, help));
             }
+            let broken = deployment.charts().flat_map(errors).collect();
+            let broken = one_list(loaded.findings.clone(), broken);
+            broken.map_or(Ok(()), |all| Err(CommandFailure::found(all, loaded.sources.clone())))?;
             context.out.findings(&loaded.findings, &loaded.sources);
             for (name, file) in lang::print::kept(&deployment) {
                 let message = format!("the coordinator `{name}` has functions: it stays Lua as it is, in `{file}`");
@@ -98,8 +102,28 @@ impl Run for Args {
         let Some(text) = converted.text else {
             return Err(unread(converted.findings, converted.sources, converted.unreadable));
         };
+        let broken = converted.coordinator.iter().flat_map(errors).collect();
+        if let Some(all) = one_list(converted.findings.clone(), broken) {
+            return Err(CommandFailure::found(all, converted.sources));
+        }
         context.out.findings(&converted.findings, &converted.sources);
         write_output(context, self.output.as_deref(), &text)?;
         Ok(Exit::Done)
     }
+}
+
+/// What is wrong with a coordinator by itself: a transition that leads nowhere cannot be written in each language.
+pub(super) fn errors(chart: &Statechart) -> Findings {
+    match compile(chart) {
+        (Some(_), _) => Findings::new(),
+        (None, found) => found.into_iter().filter(Finding::is_error).collect(),
+    }
+}
+
+/// Both, where something is wrong.
+fn one_list(mut findings: Findings, broken: Findings) -> Option<Findings> {
+    (!broken.is_empty()).then(|| {
+        findings.extend(broken);
+        findings
+    })
 }

@@ -208,6 +208,7 @@ pub(super) fn open(session: &Arc<Session>) -> Result<ControlSocket, CommandFailu
             format!("a deployment named `{name}` is already running"),
             format!("`davit shutdown {name}` takes it down; or give this one another `name`"),
         ),
+        SocketError::Descriptors { .. } => CommandFailure::usage(CLI_SYSTEM, error.to_string(), MORE_DESCRIPTORS),
         SocketError::Io { path, .. } if path.as_os_str().len() > place::LONGEST => CommandFailure::usage(
             CLI_SYSTEM,
             format!(
@@ -276,8 +277,15 @@ pub(super) fn short(error: std::io::Error) -> CommandFailure {
 }
 
 fn no_threads(what: &str, error: &std::io::Error) -> CommandFailure {
-    CommandFailure::usage(CLI_SYSTEM, format!("{what}: {error}"), "try again; the system is short of threads")
+    let help = match error.raw_os_error() {
+        Some(libc::EMFILE | libc::ENFILE) => MORE_DESCRIPTORS,
+        _ => "try again; the system is short of threads",
+    };
+    CommandFailure::usage(CLI_SYSTEM, format!("{what}: {error}"), help)
 }
+
+/// What to do where there are too few of them.
+const MORE_DESCRIPTORS: &str = "let the process have more descriptors open (`ulimit -n`)";
 
 fn tell_up(out: &Output, progress: &ProgressView, session: &Session, in_background: bool) {
     let status = session.status();

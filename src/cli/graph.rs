@@ -113,6 +113,10 @@ impl Run for Args {
                 Format::Plantuml => draw::coordinator_plantuml(&title, &read.chart, &active),
                 Format::Json => draw::coordinator_json(&read.chart, &active) + "\n",
                 Format::Scxml => {
+                    let broken = super::convert::errors(&read.chart);
+                    if !broken.is_empty() {
+                        return Err(CommandFailure::found(broken, read.sources));
+                    }
                     let left_out = lang::functions_left_out(&read.chart, read.program.as_deref());
                     context.out.findings(&left_out, &read.sources);
                     lang::print::coordinator(&read.chart, Language::Scxml)

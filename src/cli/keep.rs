@@ -43,7 +43,10 @@ impl Keep {
         }
         let hears = session.clone();
         let hear = move |text| hears.hub().report(Happening::Printed { text });
-        let printed = in_background.then(|| Printed::catch(hear)).transpose().map_err(short)?;
+        let printed = in_background.then(|| Printed::catch(hear)).transpose().map_err(|error| {
+            keeper.iter().for_each(|keeper| keeper.not_begun(&error.to_string()));
+            short(error)
+        })?;
         Ok(Self { keeper, printed })
     }
 

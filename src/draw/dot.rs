@@ -12,7 +12,7 @@ pub(super) fn write(diagram: &Diagram) -> String {
     let _ = writeln!(out, "digraph {} {{", quoted(&diagram.title));
     let _ = writeln!(
         out,
-        "  rankdir={rank}; compound=true; fontname=\"Helvetica\"; label={}; labelloc=t;",
+        "  rankdir={rank}; newrank=true; compound=true; fontname=\"Helvetica\"; label={}; labelloc=t;",
         quoted(&diagram.title)
     );
     out.push_str("  node [fontname=\"Helvetica\", fontsize=11, style=\"rounded,filled\", fillcolor=white];\n");

@@ -6,7 +6,7 @@ use super::load::{self, Content};
 use super::print;
 use super::texts::LoadOptions;
 use crate::diagnostics::{Language, SourceMap};
-use crate::model::{Finding, Findings, codes};
+use crate::model::{Finding, Findings, Statechart, codes};
 use std::path::Path;
 
 /// What converting gave.
@@ -14,6 +14,8 @@ use std::path::Path;
 pub struct Converted {
     /// The text in the language asked for; none when the file is refused.
     pub text: Option<String>,
+    /// The coordinator that it is, if it is one.
+    pub coordinator: Option<Statechart>,
     /// What was found.
     pub findings: Findings,
     /// The text that was read.
@@ -27,6 +29,7 @@ pub struct Converted {
 /// coordinator with functions is written in SCXML only, where they are left out, each with a warning.
 pub fn convert(from: &Sources, path: &Path, to: Language, options: &LoadOptions) -> Converted {
     let (content, mut findings, sources, unreadable) = load::load_any(from, path, options);
+    let mut coordinator = None;
     let text = match content {
         _ if crate::model::finding::has_errors(&findings) => None,
         Some(Content::Configurations(_) | Content::Monitors(_)) if to == Language::Scxml => {
@@ -46,9 +49,10 @@ pub fn convert(from: &Sources, path: &Path, to: Language, options: &LoadOptions)
             }
             let text = refused.is_none().then(|| print::coordinator(&chart, to));
             findings.extend(refused);
+            coordinator = Some(chart);
             text
         }
         None => None,
     };
-    Converted { text, findings, sources, unreadable }
+    Converted { text, coordinator, findings, sources, unreadable }
 }

@@ -5,6 +5,7 @@
 //! into words on a terminal is the business of `diagnostics` alone.
 
 pub use super::codes::Code;
+use crate::limits;
 
 /// Where in the user's text a model element came from: an index into the source map that the loader made.
 ///
@@ -162,6 +163,10 @@ pub fn configuration(finding: &Finding) -> Option<&str> {
 /// The known name nearest to `name`, if one is near enough to be what was meant: as a whole, or, where `name` has one part
 /// only, by its last part (`Gian` for `standard.Gain`), or as one of its words (`set` for `property_set`).
 pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    // To compare takes time by the lengths of both, and nobody has meant one by that.
+    if name.len() > limits::NEAR_NAME {
+        return None;
+    }
     // Whether it is near enough is asked of the whole; which is nearest, of what would have to be typed otherwise, and then of how they
     // begin: capitals count only there.
     let near = |candidate: &str| {

@@ -27,6 +27,11 @@ pub struct Ended {
 }
 
 impl Ended {
+    /// Of one that never began.
+    pub(super) fn unbegun() -> Self {
+        Self { phase: Phase::Down, stage: Stage::Led, forced: Vec::new(), left: Vec::new(), reported: Vec::new() }
+    }
+
     /// Whether nothing is left.
     pub fn is_clean(&self) -> bool {
         self.left.is_empty()

@@ -327,7 +327,7 @@ impl ToConfigurator {
         let reason = Some(Arc::new(Reason::Unheard));
         let verdict = request.ask.failed();
         let answer = Answer { request, verdict, at: self.hub.now(), took: Duration::ZERO, reason };
-        give(&self.hub, &junction, &answer, Vec::new(), Class::Reply);
+        give(&self.hub, &junction, &answer, Vec::new(), Class::Notice);
     }
 
     /// What one coordinator emits is an event of the others that wait for it somewhere. It is a report, so that two

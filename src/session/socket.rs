@@ -7,7 +7,7 @@
 use super::doors::Doors;
 use super::owner::Owner;
 use super::place::{self, KnownName};
-use super::room;
+use super::room::{self, DescriptorRoom};
 use super::serving::{ServedCalls, ServingShared};
 use super::subscribers::{Subscribers, ToSubscribers};
 use super::tap::LogSink;
@@ -46,6 +46,14 @@ pub enum SocketError {
     /// A deployment of that name runs already.
     #[error("a deployment named `{0}` is already running")]
     Taken(String),
+    /// The process may have so many descriptors open, and with those that are open already not one connection would fit in.
+    #[error("{open} of {limit} descriptors are open, and {} more are needed to be commanded", room::LEAST)]
+    Descriptors {
+        /// That are open.
+        open: usize,
+        /// That may be.
+        limit: usize,
+    },
     /// The operating system refused.
     #[error("cannot listen on {path}")]
     Io {
@@ -73,6 +81,10 @@ impl ControlSocket {
         let path = place::socket(name);
         let io = |source| SocketError::Io { path: path.clone(), source };
         let taken = || SocketError::Taken(name.to_owned());
+        let room = DescriptorRoom::now();
+        if let Some(DescriptorRoom { open, limit }) = room.filter(|room| room.connections(bounds.kept) == 0) {
+            return Err(SocketError::Descriptors { open, limit });
+        }
         place::prepare(&place::directory()).map_err(io)?;
         let owner = Owner::of(name).map_err(io)?.ok_or_else(taken)?;
         // Only who owns the name gets here: what lies there is left of a process that is gone, unless it answers (to who
@@ -89,7 +101,7 @@ impl ControlSocket {
         fs::set_permissions(&path, fs::Permissions::from_mode(0o600)).map_err(io)?;
         let listening = UnixStream::from(OwnedFd::from(listener.try_clone().map_err(io)?));
         let subscribers = Arc::new(Subscribers::new(bounds.queue));
-        let connections = bounds.connections.min(room::for_connections(bounds.kept));
+        let connections = room.map_or(bounds.connections, |room| bounds.connections.min(room.connections(bounds.kept)));
         let bounds = Bounds { connections, ..bounds };
         let shared = Arc::new(ServingShared { bounds, subscribers, calls: ServedCalls::default(), service });
         let doors = Arc::new(Doors::default());

@@ -4,7 +4,8 @@
 //! 1. Urgent ones (declared safety events, those that begin and end the deployment), one of each at most, of the latter two in the
 //!    order in which they came last, of the former one more behind those; then the words of
 //!    the configurator, in its order: answers, whose room was taken when they were asked for; replies, which cost nothing to give (an event
-//!    was ignored, there is no such ID), each while there is room; and what it says unasked (`ID.lost`, `ID.reverted`), one of each at most.
+//!    was ignored, there is no such ID), each while there is room; and what it says unasked (`ID.lost`, `ID.reverted`, answers for which there
+//!    was no room), one of each at most.
 //! 2. Reports: events of components, monitors and other coordinators. When their room is full there is still room for one of
 //!    each event that the chart waits for: the last of a name is never lost. The others are lost and counted.
 //! 3. Events from outside. When their room is full they are refused to whoever sends them. None of them is taken up while

@@ -116,6 +116,11 @@ impl Keeper {
         self.end(&LifeEnd { at: Wall::now(), why: Some(not_up.why.clone()), ended: Some(not_up.ended.clone()) });
     }
 
+    /// It ended before anything was asked for.
+    pub fn not_begun(&self, why: &str) {
+        self.end(&LifeEnd { at: Wall::now(), why: Some(why.to_owned()), ended: Some(Ended::unbegun()) });
+    }
+
     /// For a process that ends at once.
     pub fn leave(&self) -> Leave {
         let last = self.last.clone();
