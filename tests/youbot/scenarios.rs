@@ -8,12 +8,13 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Each with what is set for it here: what takes a minute in the file is shorter.
-const SCENARIOS: [(&str, &[(&str, &str)]); 33] = [
+const SCENARIOS: [(&str, &[(&str, &str)]); 34] = [
     ("beside", &[]),
     ("blocked", &[]),
     ("bring_up", &[]),
     ("clocks", &[]),
     ("configurator", &[]),
+    ("contact", &[]),
     ("crash", &[]),
     ("driver", &[]),
     ("energy", &[]),
@@ -124,6 +125,13 @@ fn clocks() {
 #[test]
 fn configurator() {
     run("configurator");
+}
+
+/// Against the wall by the file's own figures, and the hardest of its grid on the table.
+#[test]
+fn contact() {
+    run("contact");
+    script(&folder().join("contact.lua"), &[("place", "table"), ("law", "tank"), ("delay", "0.05")]);
 }
 
 #[test]
