@@ -46,6 +46,7 @@ impl Graph<'_, '_> {
         self.exclusives(&mut found);
         self.races(&mut found);
         self.exports_stay(&mut found);
+        self.never_entered(&mut found);
         found
     }
 

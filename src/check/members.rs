@@ -55,6 +55,11 @@ impl<'a> Member<'a> {
         self.reactions().react(leaf, event)
     }
 
+    /// The states that were left, at least once, by what was heard in these.
+    pub fn passed(&mut self, leaves: &FxHashSet<NodeId>) -> Vec<NodeId> {
+        self.reactions().passed(leaves)
+    }
+
     /// Events from outside, and time events, that are heard in `leaf`.
     pub fn offers(&mut self, leaf: NodeId) -> Rc<Vec<EventId>> {
         self.reactions().offers(leaf)

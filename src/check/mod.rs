@@ -68,6 +68,7 @@ mod met;
 mod monitors;
 mod moves_back;
 mod neighbours;
+mod never_entered;
 mod nowhere;
 mod offers;
 mod once;

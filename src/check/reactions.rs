@@ -10,7 +10,7 @@ use crate::model::{Ask, Deployment, EventName, RequestId};
 use crate::stack::{Batch, Request, Requester, Scope, Why};
 use crate::statechart::{Chart, Doo, EdgeId, EventId, Hook, HookContext, Machine, NodeId, Raised};
 use crate::time::Time;
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 use std::rc::Rc;
 
 /// What one event leads to, until the coordinator is at rest again.
@@ -123,6 +123,12 @@ impl<'a> Reactions<'a> {
         self.machine = Some(machine);
         self.table.insert((leaf, event), reaction.clone());
         reaction
+    }
+
+    /// The states that were left, at least once, by what was heard in these.
+    pub fn passed(&self, leaves: &FxHashSet<NodeId>) -> Vec<NodeId> {
+        let heard = self.table.iter().filter(|((leaf, _), _)| leaves.contains(leaf));
+        heard.flat_map(|(_, step)| step.left.iter().copied()).collect()
     }
 
     /// Events from outside, and time events, that are heard in `leaf`.

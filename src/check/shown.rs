@@ -122,6 +122,7 @@ pub const READ: &[(&str, &[Code])] = &[
             COORD_UNKNOWN_ANSWER,
             COORD_ANSWER_NEVER_COMES,
             COORD_NEVER_EMITTED,
+            COORD_NEVER_ENTERED,
             COORD_NEAR_EVENT,
             COORD_FAILURE_UNHANDLED,
             COORD_SAFE_LEFT,

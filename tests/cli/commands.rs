@@ -299,6 +299,31 @@ fn converting_there_and_back_changes_nothing() {
     assert_eq!(ran.code, 0, "{}", ran.err);
 }
 
+/// A transition that leads nowhere cannot be written in SCXML, and is no model in any language.
+#[test]
+fn a_chart_with_an_error_is_not_converted() {
+    let demo = Demo::new();
+    let chart = |second: &str| {
+        format!(
+            "coordinator:\n  states: {{ idle: {{}}, busy: {{}} }}\n  transitions:\n    - {{ src: initial, tgt: idle }}\n    - {{ {second} events: [e_go] }}\n"
+        )
+    };
+    for (second, code) in [("src: idle, tgt: bsuy,", "chart::unknown_state"), ("src: idle,", "chart::missing_end")] {
+        demo.write("chart.yaml", &chart(second));
+        for args in [
+            &["convert", "chart.yaml", "--to", "scxml"][..],
+            &["convert", "chart.yaml", "--to", "lua"],
+            &["graph", "chart.yaml", "--format", "scxml"],
+        ] {
+            let ran = demo.run(args);
+            assert_eq!((ran.code, ran.out.as_str()), (1, ""), "{args:?}: {}", ran.err);
+            assert!(ran.err.contains(code), "{args:?}: {}", ran.err);
+        }
+    }
+    demo.write("chart.yaml", &chart("src: idle, tgt: busy,"));
+    assert_eq!(demo.run(&["convert", "chart.yaml", "--to", "scxml"]).code, 0);
+}
+
 #[test]
 fn types_are_listed_and_shown() {
     let demo = Demo::new();

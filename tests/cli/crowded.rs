@@ -91,3 +91,24 @@ fn a_burst_of_events_fails_no_request() {
         + &std::fs::read_to_string(demo.path("state/davit/demo.log.1")).unwrap_or_default();
     assert!(log.contains("fast.ok") && !log.contains(".failed"), "no request failed");
 }
+
+/// Who could not be commanded does not come up, and has not lived.
+#[test]
+fn with_too_few_descriptors_nothing_is_deployed() {
+    let demo = Demo::new();
+    let program = env!("CARGO_BIN_EXE_davit");
+    for background in ["", "--detach"] {
+        let mut command = std::process::Command::new("sh");
+        command.args(["-c", &format!("ulimit -n 20; exec '{program}' deploy deployment.yaml {background}")]);
+        command
+            .current_dir(demo.path(""))
+            .env("XDG_RUNTIME_DIR", demo.path(""))
+            .env("XDG_STATE_HOME", demo.path("state"));
+        let deployed = command.stdin(Stdio::null()).output().expect("it runs");
+        let said = String::from_utf8_lossy(&deployed.stderr);
+        assert_eq!(deployed.status.code(), Some(2), "{said}");
+        assert!(said.contains("descriptors are open") && said.contains("ulimit -n"), "{said}");
+        let status = demo.run(&["status", "demo"]);
+        assert!(status.err.contains("not_running") && !status.out.contains("died"), "{}{}", status.out, status.err);
+    }
+}

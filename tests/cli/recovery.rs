@@ -370,3 +370,22 @@ fn who_recovers_is_told_what_was_done() {
     assert!(undone.code == 0 && undone.out.contains("`slow`, `run` are undone"), "{}{}", undone.out, undone.err);
     demo.run(&["shutdown", "--force"]);
 }
+
+/// A recover that failed leaves it *broken*; then its coordinators lead down what is left, which is right again.
+#[test]
+fn broken_is_told_when_it_comes_to_be_and_when_it_is_over() {
+    let demo = Demo::new();
+    for file in std::fs::read_dir(format!("{}/examples/pair", env!("CARGO_MANIFEST_DIR"))).expect("the folder") {
+        let file = file.expect("a file");
+        std::fs::copy(file.path(), demo.path(&file.file_name().to_string_lossy())).expect("copied");
+    }
+    demo.write(
+        "story.lua",
+        "fault('connect left/Drive.pose -> right/Drive.ref', 'lie', 2)
+         deploy('pair.yaml') wait(0.6) pcall(recover, 'back') fail('left/Drive') wait(20)
+         for _, entry in ipairs(log()) do if entry.phase then say('phase ' .. entry.phase) end end",
+    );
+    let ran = demo.run(&["run", "story.lua", "--platform", "simulated", "--clock", "simulated"]);
+    let phases: Vec<&str> = ran.out.lines().filter_map(|line| line.trim().strip_prefix("phase ")).collect();
+    assert_eq!(phases, ["deploying", "up", "broken", "up"], "{}{}", ran.out, ran.err);
+}

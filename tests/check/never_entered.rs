@@ -1,0 +1,79 @@
+//! States to which transitions lead that are never taken.
+
+use super::composed::{catalogue, load};
+use davit::check::{self, Report};
+use davit::lang::Sources;
+use davit::model::Severity;
+
+const DEPLOYMENT: &str = "
+davit: 1
+name: cell
+platform: simulated
+types: { Lamp: { properties: { level: { type: float, default: 0.0 } } } }
+configurations: [conf.yaml]
+coordinator: coord.yaml
+deploy: { event: e_start, up: on, within_s: 5 }
+shutdown: { event: e_end, down: off, within_s: 5 }
+";
+
+const CONFIGURATIONS: &str = "
+configurations:
+  build: { changes: [{ create: { component: lamp, type: Lamp } }] }
+  fast: { changes: [{ property_set: { property: lamp.level, value: 1.0 } }] }
+";
+
+/// From `on` it goes to `hurry` by these, and `hurry` asks for `fast`.
+fn coordinator(more: &str) -> String {
+    format!(
+        "coordinator:
+  states: {{ off: {{}}, making: {{ entry: build }}, on: {{}}, hurry: {{ config: fast }}, leaving: {{ entry: build.undo }}, left: {{}} }}
+  transitions:
+    - {{ src: initial, tgt: off }}
+    - {{ src: off, tgt: making, events: [e_start] }}
+    - {{ src: making, tgt: 'on', events: [build.ok] }}
+    - {{ src: making, tgt: leaving, events: [build.failed, build.broken, e_end] }}
+    - {{ src: hurry, tgt: 'on', events: [e_slow, fast.failed, fast.broken] }}
+    - {{ src: hurry, tgt: leaving, events: [e_end] }}
+    - {{ src: 'on', tgt: leaving, events: [e_end] }}
+    - {{ src: leaving, tgt: off, events: [build.undone] }}
+    - {{ src: leaving, tgt: left, events: [build.undo.failed, build.undo.broken] }}
+    - {{ src: left, tgt: leaving, events: [e_end] }}
+{more}"
+    )
+}
+
+fn checked(more: &str) -> Report {
+    let files = [
+        ("cell.yaml", DEPLOYMENT.to_owned()),
+        ("conf.yaml", CONFIGURATIONS.to_owned()),
+        ("coord.yaml", coordinator(more)),
+    ];
+    let deployment = load(&Sources::memory(files), "cell.yaml", &[]).deployment.expect("it can be read");
+    let catalogue = catalogue(&deployment);
+    check::run(deployment, &catalogue)
+}
+
+fn told(report: &Report) -> Vec<(Severity, &str)> {
+    let never = report.findings.iter().filter(|finding| finding.code.0 == "coord::never_entered");
+    never.map(|finding| (finding.severity, &*finding.message)).collect()
+}
+
+#[test]
+fn where_only_its_own_answer_leads_nobody_comes() {
+    let report = checked("    - { src: 'on', tgt: hurry, events: [fast.ok] }\n");
+    let message = "`root.hurry` is never entered: `fast.ok` never comes where that would lead there";
+    let expected = if report.explored.complete { Severity::Warning } else { Severity::Info };
+    assert_eq!(told(&report), [(expected, message)]);
+    assert_eq!(told(&checked("    - { src: 'on', tgt: hurry, events: [e_fast] }\n")), []);
+}
+
+#[test]
+fn of_several_the_first_on_the_way_is_told() {
+    let beyond =
+        "    - { src: 'on', tgt: hurry, events: [fast.ok] }\n    - { src: hurry, tgt: left, events: [e_far] }\n";
+    assert_eq!(told(&checked(beyond)).len(), 1);
+    // Who passes through has been there.
+    let passed =
+        "    - { src: 'on', tgt: hurry, events: [e_fast] }\n    - { src: hurry, tgt: 'on', events: [e_done] }\n";
+    assert_eq!(told(&checked(passed)), []);
+}
