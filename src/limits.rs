@@ -205,10 +205,6 @@ pub const INBOX_REPORT: usize = 4096;
 /// Events from outside that may wait for a coordinator: a person types, and a program that sends faster than that is told.
 pub const INBOX_OUTSIDE: usize = 1024;
 
-/// Replies that each wait for a coordinator to hear them: that an event was ignored which it has raised for a subsystem, or that there is no such ID.
-/// Of more there is one of each name for a state.
-pub const INBOX_REPLIES: usize = 64;
-
 /// Safety events, losses and the like for which an inbox has room from the beginning. There are two of each name at most;
 /// beyond that it grows, and stays as large.
 pub const INBOX_SINGLES: usize = 64;

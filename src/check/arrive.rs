@@ -42,7 +42,7 @@ impl Product<'_> {
                 if self.parent.as_ref().is_some_and(|parent| parent.hears.contains(&name)) {
                     state.told.push(name);
                 }
-                self.tells_child(state, name);
+                self.tells_child(state, by, *emitted);
                 self.confirm(state, name);
                 let hearers = self.hearers(state, name, Some(by));
                 self.spread_to(state, &hearers);

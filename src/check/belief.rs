@@ -249,10 +249,11 @@ impl Beliefs {
                 InterfaceAction::Tells(event, _) if self.heard.contains(event) => {}
                 InterfaceAction::Tells(event, _) if !is_told(*event, untaken) => {}
                 InterfaceAction::Tells(..) => next.push((*to, untaken)),
-                InterfaceAction::Takes { event, .. } => {
+                InterfaceAction::Takes { event, heeded } => {
                     next.extend(self.others.contains(event).then_some((*to, untaken)));
-                    let rest = taken.iter().filter(|(taken, _)| taken == event);
-                    next.extend(rest.map(|(_, rest)| (*to, *rest)));
+                    // Of those that are one each is told to have been ignored.
+                    let rest = taken.iter().filter(|taken| taken.event == *event);
+                    next.extend(rest.map(|taken| (*to, if *heeded { taken.rest } else { taken.but_one })));
                 }
             }
         }
@@ -261,23 +262,37 @@ impl Beliefs {
         next
     }
 
-    /// What it may take next of what it has not taken, each with what is left then: of some of it the rest may not have come yet.
-    fn taken(&self, untaken: [u8; MOST_UNTAKEN]) -> SmallVec<[(EventName, [u8; MOST_UNTAKEN]); 1]> {
+    /// What it may take next of what it has not taken: of some of it the rest may not have come yet.
+    fn taken(&self, untaken: [u8; MOST_UNTAKEN]) -> SmallVec<[TakenNext; 1]> {
         let takes = |place: &u8| self.takes.get(usize::from(*place).wrapping_sub(1)).copied();
         let came: SmallVec<[(EventName, Precedence); MOST_UNTAKEN]> = untaken.iter().map_while(takes).collect();
-        let mut all: SmallVec<[(EventName, [u8; MOST_UNTAKEN]); 1]> = SmallVec::new();
+        let mut all: SmallVec<[TakenNext; 1]> = SmallVec::new();
         for some in 1..=came.len() {
             let first = taken_first(&came[..some]);
             let Some(event) = first.first().map(|at| came[*at].0) else { continue };
-            let mut rest = [0; MOST_UNTAKEN];
-            let left = untaken.iter().enumerate().filter(|(at, _)| !first.contains(at));
-            rest.iter_mut().zip(left).for_each(|(place, (_, left))| *place = *left);
-            if !all.contains(&(event, rest)) {
-                all.push((event, rest));
+            let without = |gone: &[usize]| {
+                let mut rest = [0; MOST_UNTAKEN];
+                let left = untaken.iter().enumerate().filter(|(at, _)| !gone.contains(at));
+                rest.iter_mut().zip(left).for_each(|(place, (_, left))| *place = *left);
+                rest
+            };
+            let taken = TakenNext { event, rest: without(&first), but_one: without(&first[..1]) };
+            if !all.contains(&taken) {
+                all.push(taken);
             }
         }
         all
     }
+}
+
+/// An event that is taken next, as one with others of it that have come.
+#[derive(PartialEq, Eq)]
+struct TakenNext {
+    event: EventName,
+    /// What is left then.
+    rest: [u8; MOST_UNTAKEN],
+    /// What is left without the first of them.
+    but_one: [u8; MOST_UNTAKEN],
 }
 
 /// Whether an event is told where so much is still to be taken: that it is down is seen where it rests, and what lies before it then comes to

@@ -44,6 +44,8 @@ pub struct Child {
     pub holds: BTreeSet<String>,
     /// It may do so though nobody has begun it.
     pub unbidden: bool,
+    /// It may go somewhere, and tell of it, by another event than the one that begins it.
+    pub wakes: bool,
     /// What it tells only where something has failed, or a monitor reports it.
     pub uncertain: BTreeSet<EventName>,
     /// What may be known of it; none: it may tell anything in any order.
@@ -84,7 +86,8 @@ impl Child {
             };
             let touching = deployment.configurations.iter().filter(touches).map(|c| c.id).collect();
             let (begins, down) = (own.deploy.event.within(path), SubsystemStanding::Down.event(path));
-            let (holds, unbidden) = (subsystem.holds.clone(), !subsystem.holds.is_empty() && is_unbidden(subsystem));
+            let (holds, wakes) = (subsystem.holds.clone(), is_unbidden(subsystem));
+            let unbidden = wakes && !holds.is_empty();
             let (up, beliefs) = (SubsystemStanding::Up.event(path), None);
             let (ends, ends_unbegun) = (own.shutdown.event.within(path), ends_unbegun(own));
             let ignores = EventName::new(&format!("{ends}{IGNORED}")).ok();
@@ -92,7 +95,7 @@ impl Child {
             let at_first = ignores.and_then(|_| deaf(own, false));
             let is_first = at_first.is_some();
             let deaf = at_first.or_else(|| ignores.and_then(|_| deaf(own, true)));
-            // That it was ended is kept as that it was let go: of one that leaves it is not known.
+            // That it was ended is kept as that it was let go: of one that leaves it is not known how often.
             let deaf_once_ended = !is_first && (until == ends || deaf.is_none());
             let uncertain = uncertain_events(own).into_iter().map(|event| event.within(path)).collect();
             Self {
@@ -111,6 +114,7 @@ impl Child {
                 touching,
                 holds,
                 unbidden,
+                wakes,
                 uncertain,
                 beliefs,
             }
@@ -129,9 +133,6 @@ pub fn promised(at: usize) -> u64 {
 
 /// One was begun anew before it was heard to be down: what is heard then may be of the life before.
 pub const DOUBT: u64 = 1 << 63;
-
-/// One was begun that had been ended before, and has not told yet that it ignored that.
-pub const MIXED: u64 = 1 << 62;
 
 /// A state in which a subsystem ignores the event that ends it though it is not down, as far as that is known of what its coordinators wait for:
 /// before it was raised, or after that as well.

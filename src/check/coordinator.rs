@@ -1,5 +1,6 @@
 //! The coordinator against the deployment: what it asks for, what it waits for, which states the deployment names.
 
+use super::left_unanswered;
 use super::paths;
 use super::slips::KnownEvents;
 use crate::model::codes::{
@@ -32,6 +33,7 @@ pub fn check(deployment: &Deployment, chart: &Chart, known: &KnownEvents<'_>) ->
     states(deployment, chart, &mut findings);
     raised(deployment, chart, known, &mut findings);
     heard(deployment, chart, known, &mut findings);
+    left_unanswered::check(deployment, chart, &mut findings);
     findings
 }
 

@@ -59,6 +59,7 @@ mod lasts;
 mod late;
 mod led_elsewhere;
 mod led_on;
+mod left_unanswered;
 mod let_go;
 mod library;
 mod links;

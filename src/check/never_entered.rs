@@ -4,8 +4,8 @@
 use super::explore::Graph;
 use super::judge::Traced;
 use crate::model::codes::COORD_NEVER_ENTERED;
-use crate::model::{Finding, Severity};
-use crate::statechart::NodeId;
+use crate::model::{ConfigId, EventName, Finding, Severity};
+use crate::statechart::{EventId, NodeId};
 use rustc_hash::FxHashSet;
 use std::collections::BTreeSet;
 
@@ -17,7 +17,7 @@ impl Graph<'_, '_> {
         }
         // A subsystem's file is written for other parents, too.
         let known = self.bounds.is_empty() && self.product.parent.is_none();
-        let severity = if known { Severity::Warning } else { Severity::Info };
+        let asked = self.product.worlds.asked().clone();
         for number in 0..self.product.members.len() {
             let entered = self.entered(number);
             let member = &self.product.members[number];
@@ -32,6 +32,20 @@ impl Graph<'_, '_> {
                 let edges = chart.nodes().filter(|from| entered[from.index()]).flat_map(|from| chart.outgoing(from));
                 let leading: Vec<_> = edges.filter(|edge| chart.is_inside(chart.ends(*edge).1, node)).collect();
                 let Some(first) = leading.first().filter(|_| outermost) else { continue };
+                // What nobody asks for but who is there already is a slip; that something does not come that was to be heard in time is prudence.
+                let name = |event: &EventId| member.name_of(*event);
+                let mut names =
+                    leading.iter().flat_map(|edge| chart.triggers(*edge).unwrap_or_default()).filter_map(name);
+                let ids = self.product.deployment.configurations.iter().map(|configuration| configuration.id);
+                let unasked: Vec<ConfigId> = ids.filter(|id| !asked.contains(id)).collect();
+                let answers = |name: EventName| {
+                    let of = |id: &ConfigId| {
+                        name.as_str().strip_prefix(id.as_str()).is_some_and(|rest| rest.starts_with('.'))
+                    };
+                    unasked.iter().any(of)
+                };
+                let slip = known && !leading.is_empty() && names.all(answers);
+                let severity = if slip { Severity::Warning } else { Severity::Info };
                 let events = leading.iter().flat_map(|edge| chart.triggers(*edge).unwrap_or_default());
                 let events: BTreeSet<String> = events.map(|event| format!("`{}`", chart.event_text(*event))).collect();
                 let events: Vec<String> = events.into_iter().collect();

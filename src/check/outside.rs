@@ -155,7 +155,7 @@ impl Product<'_> {
                 let mut next = state.clone();
                 next.beliefs.set(at, *then);
                 if takes.is_empty() && state.inbox.is_empty() {
-                    self.hears_of_child(&mut next, name);
+                    self.hears_of_child(&mut next, 0, name);
                     nexts.all.push(Next::plain(Move::Unheard(place), self.settle(next), *failed));
                 } else {
                     let from = nexts.all.len();

@@ -328,7 +328,7 @@ impl<'a> Product<'a> {
         if !self.children.is_empty()
             && let Some(name) = self.members[number].name_of(event)
         {
-            self.hears_of_child(&mut state, name);
+            self.hears_of_child(&mut state, number, name);
         }
         self.begins_subsystem(&mut state, number, event);
         for state in self.react(state, number, event) {

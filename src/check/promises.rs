@@ -2,12 +2,13 @@
 //! to it here: it asks for what touches it only then, and holds no frame of it any more when the promise ends. The file of the subsystem
 //! is in [`exports`](super::exports).
 
-use super::children::{Child, DOUBT, MIXED, begun, promised, released};
+use super::children::{Child, DOUBT, begun, promised, released};
 use super::explore::Graph;
 use super::judge::{Traced, severity_of};
 use super::product::Product;
-use super::reactions::triggers;
-use super::state::{Failed, ProductState};
+use super::reactions::{Emitted, triggers};
+use super::seldom::RaisedForChild;
+use super::state::{Failed, ProductState, index};
 use crate::model::codes::{COMPOSE_PROMISE, COMPOSE_UNLEFT};
 use crate::model::subsystem::IGNORED;
 use crate::model::{Ask, ConfigId, EventName, Finding};
@@ -15,35 +16,57 @@ use crate::statechart::{EventId, NodeId};
 use rustc_hash::FxHashMap;
 use std::collections::BTreeMap;
 
-/// Whether that a subsystem ignores the event that ends it says that it is down: it ignores that nowhere else, or was ended once since it was begun; and
-/// nothing of before may be told yet.
+/// Whether that a subsystem ignores the event that ends it says that it is down: it ignores that nowhere else, or was ended once since it was begun.
 fn is_over(state: &ProductState, child: &Child, at: usize) -> bool {
     let ended = state.children & (begun(at) | promised(at) | released(at));
-    let once = child.deaf.is_none() || ended == begun(at) | released(at);
-    state.children & MIXED == 0 && once || state.children & begun(at) == 0
+    child.deaf.is_none() || ended == begun(at) | released(at) || state.children & begun(at) == 0
 }
 
 /// The event that begins, or ends, a subsystem is raised: kept in what else cannot be of one. It is *released* and *promised* where that was
 /// raised once more since it was ended, and *released* though not begun where it was ended so.
-fn raised_anew(state: &mut ProductState, child: &Child, at: usize, begins: bool, ends: bool) {
+fn raised_anew(state: &mut ProductState, at: usize, begins: bool, ends: bool) {
     let (is_begun, is_released) = (state.children & begun(at) != 0, state.children & released(at) != 0);
     match (is_begun, is_released) {
-        // Where it is deaf nowhere, only what is ignored in another life makes a difference.
-        (true, _) if child.deaf.is_none() => state.children |= if begins { MIXED } else { 0 },
         (true, true) if begins || ends => state.children |= promised(at),
         (false, false) if ends => state.children = state.children & !promised(at) | released(at),
-        // What is ignored of that may be told in the life that begins.
-        (false, true) if begins => {
-            state.children &= !released(at);
-            state.children |= MIXED;
-        }
+        (false, true) if begins => state.children &= !released(at),
         _ => {}
     }
 }
 
+/// That an event was ignored may still be told of this life of the subsystem, or of one before.
+const OF_THIS_LIFE: u64 = 1;
+const OF_ANOTHER: u64 = 2;
+
+/// Of so many events that end one subsystem it is kept that it may still be told that they were ignored; of more it may be of another life.
+const MOST_ENDS: usize = 4;
+
+/// The event that begins, or ends, a subsystem is raised, which that may tell to have ignored: to this state of who raised it, while it is not left.
+fn may_be_ignored(state: &mut ProductState, child: &Child, (by, emitted): (usize, Emitted)) {
+    let (begins, ends) = (emitted.event == child.begins, emitted.event == child.ends);
+    if begins && state.offered.iter().any(|of| of.event == child.ends) {
+        state.change(|seldom| seldom.offered.update(|of| of.event == child.ends, |of| of.waits = OF_ANOTHER));
+    }
+    if let (true, Some(owner)) = (ends, emitted.owner) {
+        let many = state.offered.iter().filter(|of| of.event == child.ends).count() >= MOST_ENDS;
+        let raised = RaisedForChild { event: child.ends, by: index(by), owner, waits: OF_THIS_LIFE };
+        state.change(|seldom| match many {
+            true => seldom.offered.update(|of| of.event == child.ends, |of| of.waits = OF_ANOTHER),
+            false => seldom.offered.push(raised),
+        });
+    }
+}
+
+/// A coordinator hears that one of those was ignored: whether that is of this life.
+fn is_of_this_life(state: &mut ProductState, child: &Child, by: usize) -> bool {
+    let own = |of: &RaisedForChild| of.event == child.ends && of.by == index(by);
+    let Some(at) = state.offered.iter().position(own) else { return false };
+    state.change(|seldom| seldom.offered.remove(at)).waits == OF_THIS_LIFE
+}
+
 impl Product<'_> {
     /// An event is heard, or would be if anybody waited for it: it may tell how a subsystem stands.
-    pub(super) fn hears_of_child(&self, state: &mut ProductState, name: EventName) {
+    pub(super) fn hears_of_child(&self, state: &mut ProductState, by: usize, name: EventName) {
         for (at, child) in self.children.iter().enumerate() {
             if name == child.from || name == child.up {
                 // What comes after it was let go may have been told before.
@@ -51,7 +74,7 @@ impl Product<'_> {
                     state.children |= promised(at);
                 }
             } else if name == child.down
-                || child.is_down_by(name) && is_over(state, child, at)
+                || child.is_down_by(name) && is_of_this_life(state, child, by) && is_over(state, child, at)
                 || child.is_known_down(name, state.beliefs.get(at).copied().unwrap_or_default())
             {
                 state.children &= !(promised(at) | begun(at) | released(at));
@@ -60,7 +83,8 @@ impl Product<'_> {
     }
 
     /// A coordinator raises an event: it may be for a subsystem.
-    pub(super) fn tells_child(&mut self, state: &mut ProductState, name: EventName) {
+    pub(super) fn tells_child(&mut self, state: &mut ProductState, by: usize, emitted: Emitted) {
+        let name = emitted.event;
         for (at, child) in self.children.iter_mut().enumerate() {
             if let (Some(beliefs), Some(own)) = (&mut child.beliefs, name.local(child.path))
                 && let Ok(own) = EventName::new(own)
@@ -73,7 +97,10 @@ impl Product<'_> {
                 }
             }
             if child.knows_ignored() {
-                raised_anew(state, child, at, name == child.begins, name == child.ends);
+                may_be_ignored(state, child, (by, emitted));
+            }
+            if child.knows_ignored() && child.deaf.is_some() {
+                raised_anew(state, at, name == child.begins, name == child.ends);
             }
             if name == child.begins {
                 if state.children & begun(at) != 0 && !child.holds.is_empty() {
@@ -104,7 +131,12 @@ impl Product<'_> {
         let told = |child: &Child| name.local(child.path).is_some_and(|own| !own.ends_with(IGNORED));
         // Where it is known what it may tell, that says so.
         let unknown = |child: &Child| child.beliefs.is_none() || !child.ends_unbegun;
-        children.any(|(at, child)| told(child) && unknown(child) && state.children & begun(at) == 0)
+        let silent = |at: usize, child: &Child| {
+            told(child) && unknown(child) && !child.wakes && state.children & begun(at) == 0
+                // Nothing is ignored that was not raised.
+                || child.is_down_by(name) && !state.offered.iter().any(|of| of.event == child.ends)
+        };
+        children.any(|(at, child)| silent(at, child))
     }
 
     /// Whether it is known when an event comes that a subsystem tells.

@@ -673,7 +673,8 @@ codes! {
     COORD_NEVER_ENTERED = "coord::never_entered", "a state is never entered, whatever comes",
         "Transitions lead to the state, and in all that was followed none of them is taken: where they begin, what they wait for never comes. Most \
          often an answer stands there in the place of an event (`fast.ok` leads to the state that asks for `fast`), or a transition that is tried before \
-         it takes the same event. It is a note where not everything was followed, and in the file of a subsystem, which other parents may lead there.";
+         it takes the same event. It is a warning where all was followed and only answers to what nobody asks for elsewhere lead there; else a note: a state may be there for what does \
+         not come in this deployment.";
     COORD_STUCK = "coord::stuck", "the coordinator can get to where nothing leads on",
         "On the way shown, the coordinator reaches a state in which no answer is awaited and no event leads anywhere, \
          neither from inside nor from outside. Only a stop without its coordinator gets the system out. Where the state waits for answers, \

@@ -189,7 +189,7 @@ impl Listener for ToConfigurator {
                         from: "configurator".to_owned(),
                         safety: false,
                     });
-                    self.deliver(Incoming::new(Class::Reply, event).tagged(Some(Tag::from(*raised))));
+                    self.deliver(Incoming::new(Class::Notice, event).tagged(Some(Tag::from(*raised))));
                 }
                 Meaning::Unknown(name) => self.hub.note(Happening::Noted {
                     note: format!("`{name}` was raised: no configuration, and not declared under `emits`"),

@@ -364,7 +364,8 @@ impl Subsystems {
             let event = EventName::new(&format!("{}{IGNORED}", of.event)).expect("an event with a suffix is one");
             hub.note(Happening::Event { event: event.to_string(), from: "configurator".to_owned(), safety: false });
             if let Some(coordinator) = junction.coordinator(of.by) {
-                hub.taken(coordinator.deliver(Incoming::new(Class::Reply, event).tagged(of.tag)));
+                // In the order of what else the subsystem tells.
+                hub.taken(coordinator.deliver(Incoming::new(Class::Report, event).tagged(of.tag)));
             }
         }
     }

@@ -100,7 +100,7 @@ fn a_coordinator_takes_events_of_every_class_without_allocating() {
     let (chart, _) = compile(&Statechart::new(root));
     let coordinator = CoordinatorHandle::start("coordinator", Arc::new(chart.unwrap()), &clock, listener);
     let next = EventName::new("next").unwrap();
-    let all = [Class::Urgent, Class::Answer, Class::Reply, Class::Notice, Class::Report, Class::Outside];
+    let all = [Class::Urgent, Class::Answer, Class::Notice, Class::Report, Class::Outside];
     let (mut sent, mut begun) = (1, None);
     let sending = |class: Class| {
         coordinator.hold(class).unwrap();

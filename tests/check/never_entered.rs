@@ -26,7 +26,7 @@ configurations:
 fn coordinator(more: &str) -> String {
     format!(
         "coordinator:
-  states: {{ off: {{}}, making: {{ entry: build }}, on: {{}}, hurry: {{ config: fast }}, leaving: {{ entry: build.undo }}, left: {{}} }}
+  states: {{ off: {{}}, making: {{ entry: build }}, on: {{}}, hurry: {{ config: fast }}, leaving: {{ entry: build.undo }}, left: {{}}, far: {{}} }}
   transitions:
     - {{ src: initial, tgt: off }}
     - {{ src: off, tgt: making, events: [e_start] }}
@@ -65,6 +65,12 @@ fn where_only_its_own_answer_leads_nobody_comes() {
     let expected = if report.explored.complete { Severity::Warning } else { Severity::Info };
     assert_eq!(told(&report), [(expected, message)]);
     assert_eq!(told(&checked("    - { src: 'on', tgt: hurry, events: [e_fast] }\n")), []);
+    // That something is heard which does not come here may be prudence.
+    let prudent = checked(
+        "    - { src: 'on', tgt: hurry, events: [e_fast] }\n    - { src: 'on', tgt: far, events: [build.undone] }\n",
+    );
+    let message = "`root.far` is never entered: `build.undone` never comes where that would lead there";
+    assert_eq!(told(&prudent), [(Severity::Info, message)]);
 }
 
 #[test]
@@ -76,4 +82,20 @@ fn of_several_the_first_on_the_way_is_told() {
     let passed =
         "    - { src: 'on', tgt: hurry, events: [e_fast] }\n    - { src: hurry, tgt: 'on', events: [e_done] }\n";
     assert_eq!(told(&checked(passed)), []);
+}
+
+/// An answer goes to the state that asked, while that is active: a state beside it waits in vain.
+#[test]
+fn an_answer_goes_to_nobody_beside_who_asked() {
+    let vain = |more: &str| {
+        let report = checked(&format!("    - {{ src: 'on', tgt: hurry, events: [e_fast] }}\n{more}"));
+        let never = report.findings.iter().filter(|finding| finding.code.0 == "coord::answer_never_comes");
+        never.map(|finding| (finding.severity, finding.message.clone())).collect::<Vec<_>>()
+    };
+    let beside = "    - { src: hurry, tgt: far, events: [e_far] }\n    - { src: far, tgt: leaving, events: [e_end, fast.ok, fast.failed] }\n";
+    let message = "`fast.ok`, `fast.failed` never come in `root.far`: an answer goes to the state that asked, `root.hurry`, and is lost when that is left";
+    assert_eq!(vain(beside), [(Severity::Warning, message.to_owned())]);
+    // What is asked for on a transition goes to all that is inside of what is around it.
+    let asked = "    - { src: hurry, tgt: far, events: [e_far], effect: [fast] }\n    - { src: far, tgt: leaving, events: [e_end, fast.ok] }\n";
+    assert_eq!(vain(asked), []);
 }

@@ -119,6 +119,14 @@ fn that_one_was_down_before_anybody_waited_for_it_is_told_where_there_is_too_muc
         .replace("four: {}", "four: {}\n        five: {}")
         .replace("        - { src: three, tgt: four,", "        - { src: three, tgt: five, events: [star/down, star/e_off.ignored] }\n        - { src: three, tgt: four,")
         + "    - { src: .alive.five, tgt: off, events: [port/down, port/e_off.ignored] }\n";
+    // That something was ignored is told to who raised it: `three` is left with the first.
+    let report = checked(hears.clone(), 800_000);
+    let stops = said(&report, "coord::no_way_down");
+    assert!(stops.len() == 1 && stops[0].0 == "from `root.alive.five` no way leads to `off`", "{stops:?}");
+    let hears = hears.replace("three: { entry: [port/e_off, star/e_off] }", "three: {}").replace(
+        "tgt: .alive.three, events: [e_end]",
+        "tgt: .alive.three, events: [e_end], effect: [port/e_off, star/e_off]",
+    );
     let report = checked(hears, 800_000);
     assert_eq!(said(&report, "coord::no_way_down"), []);
     assert!(matches!(report.verdict, CheckVerdict::Followed { .. }), "{:#?}", report.findings);
@@ -244,4 +252,83 @@ fn that_one_which_leaves_ignored_its_end_says_that_it_is_down_where_there_is_too
     let deaf =
         LEAVING_POD_COORDINATOR.replace("src: alive, tgt: .alive.leaving", "src: .alive.on, tgt: .alive.leaving");
     assert!(!said(&checked(&deaf), "compose::promise").is_empty());
+}
+
+/// A parent that makes `again` what is there where it comes to `trap`.
+fn again(states: &str, transitions: &str) -> String {
+    format!(
+        "coordinator:
+  states:
+    off: {{}}
+    own: {{ entry: own }}
+    ready: {{}}
+{states}
+    trap: {{ entry: again }}
+    down: {{ entry: [port/e_off, port/e_released] }}
+    unown: {{ entry: own.undo }}
+    left: {{}}
+  transitions:
+    - {{ src: initial, tgt: off }}
+    - {{ src: off, tgt: own, events: [e_start] }}
+    - {{ src: own, tgt: ready, events: [own.ok] }}
+    - {{ src: own, tgt: down, events: [own.failed, own.broken, e_end] }}
+    - {{ src: ready, tgt: down, events: [e_end] }}
+{transitions}
+    - {{ src: trap, tgt: down, events: [e_end, again.ok, again.failed, again.broken] }}
+    - {{ src: down, tgt: unown, events: [port/down, port/e_off.ignored] }}
+    - {{ src: unown, tgt: off, events: [own.undone] }}
+    - {{ src: unown, tgt: left, events: [own.undo.failed, own.undo.broken] }}
+    - {{ src: left, tgt: unown, events: [e_end] }}
+"
+    )
+}
+
+const AGAIN: &str = "
+configurations:
+  own: { changes: [{ create: { component: lamp, type: Lamp } }] }
+  again: { changes: [{ create: { component: lamp, type: Lamp } }] }
+";
+
+/// Refusals that are found of a parent of one subsystem, where nothing is known of the order in which that tells things.
+fn refused(pod: &str, pod_coordinator: &str, parent: &str) -> usize {
+    let one = JOINED.replace("star: { deployment: pod.yaml }", "").replace("failed: [failed], ", "");
+    let one = one.replace("{ deployment: pod.yaml }, }", "{ deployment: pod.yaml } }");
+    let files = [
+        ("pod.yaml", pod),
+        ("pod_conf.yaml", LEAVING_POD_CONF),
+        ("pod_coord.yaml", pod_coordinator),
+        ("two.yaml", &one),
+        ("two_conf.yaml", AGAIN),
+        ("two_coord.yaml", parent),
+    ];
+    let report = of_files(files, 600);
+    assert!(report.left.iter().any(|bound| bound.contains("in which order subsystems")), "{:#?}", report.left);
+    said(&report, "coord::request_refused").len()
+}
+
+/// What is ignored of an event that was raised before a subsystem was begun says nothing of the life that has begun since.
+#[test]
+fn what_was_ignored_in_another_life_does_not_say_that_it_is_down() {
+    let parent = again(
+        "    cycle: { entry: [port/e_off, port/e_off], states: { w: {}, w1: {}, w2: {} }, transitions: [
+      { src: initial, tgt: w }, { src: w, tgt: w1, events: [port/e_off.ignored], effect: [port/e_on] }, { src: w1, tgt: w2, events: [port/e_off.ignored] }] }",
+        "    - { src: ready, tgt: cycle, events: [e_go] }
+    - { src: .cycle.w2, tgt: trap, events: [port/up] }
+    - { src: cycle, tgt: down, events: [e_end] }",
+    );
+    assert_eq!(refused(LEAVING_POD, LEAVING_POD_COORDINATOR, &parent), 1);
+}
+
+/// So does another event than the one that begins it.
+#[test]
+fn what_wakes_a_subsystem_lets_it_tell_what_it_tells() {
+    let parent = again(
+        "    kicked: { entry: port/e_kick }",
+        "    - { src: ready, tgt: kicked, events: [e_go] }
+    - { src: kicked, tgt: trap, events: [port/up] }
+    - { src: kicked, tgt: down, events: [e_end] }",
+    );
+    let pod = LEAVING_POD.replace("accepts: [e_released]", "accepts: [e_released, e_kick]");
+    let chart = LEAVING_POD_COORDINATOR.replace("events: [e_on]", "events: [e_on, e_kick]");
+    assert_eq!(refused(&pod, &chart, &parent), 1);
 }

@@ -63,3 +63,20 @@ fn each_event_that_is_ignored_is_answered() {
     let ran = demo.run(&["run", "story.lua", "--clock", "simulated"]);
     assert!(ran.code == 0 && ran.out.contains("cell:root.second"), "{}{}", ran.out, ran.err);
 }
+
+/// That something was ignored is heard behind what the subsystem told before.
+#[test]
+fn what_is_ignored_is_told_in_the_order_of_what_else_is() {
+    let told_first = COORDINATOR.replace(
+        r#"trans { src = "lowering", tgt = "idle", events = { "duo/down" } },"#,
+        r#"again = state { entry = { "duo/e_start", "duo/e_shutdown", "duo/e_shutdown" } }, odd = state {},
+  trans { src = "lowering", tgt = "again", events = { "duo/down" } },
+  trans { src = "again", tgt = "idle", events = { "duo/down" } },
+  trans { src = "again", tgt = "odd", events = { "duo/e_shutdown.ignored" } },"#,
+    );
+    let demo = cell();
+    demo.write("cell_coordinator.lua", &told_first);
+    demo.write("story.lua", r#"deploy("cell.yaml") shutdown()"#);
+    let ran = demo.run(&["run", "story.lua", "--clock", "simulated"]);
+    assert!(!ran.out.contains("cell:root.odd"), "{}{}", ran.out, ran.err);
+}

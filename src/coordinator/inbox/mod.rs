@@ -3,9 +3,8 @@
 //!
 //! 1. Urgent ones (declared safety events, those that begin and end the deployment), one of each at most, of the latter two in the
 //!    order in which they came last, of the former one more behind those; then the words of
-//!    the configurator, in its order: answers, whose room was taken when they were asked for; replies, which cost nothing to give (an event
-//!    was ignored, there is no such ID), each while there is room; and what it says unasked (`ID.lost`, `ID.reverted`, answers for which there
-//!    was no room), one of each at most.
+//!    the configurator, in its order: answers, whose room was taken when they were asked for, and what it says unasked
+//!    (`ID.lost`, `ID.reverted`, answers for which there was no room), one of each at most.
 //! 2. Reports: events of components, monitors and other coordinators. When their room is full there is still room for one of
 //!    each event that the chart waits for: the last of a name is never lost. The others are lost and counted.
 //! 3. Events from outside. When their room is full they are refused to whoever sends them. None of them is taken up while
@@ -36,8 +35,6 @@ pub enum Class {
     Urgent,
     /// An answer; its room is [held](super::CoordinatorHandle::hold) since it was asked for.
     Answer,
-    /// Told at once of what a state has raised, and nobody held room for it. Each is one; where there is no room any more they are notices.
-    Reply,
     /// What the configurator says unasked. One that waits already gives way to this one: the last word counts.
     Notice,
     /// An event of a component, a monitor or another coordinator.
@@ -152,7 +149,6 @@ struct HeldRoom {
 #[derive(Debug, Clone, Copy)]
 struct InboxBounds {
     answers: usize,
-    replies: usize,
     report: usize,
     outside: usize,
     joined: usize,
@@ -162,7 +158,6 @@ struct InboxBounds {
 
 const BOUNDS: InboxBounds = InboxBounds {
     answers: limits::INBOX_ANSWERS,
-    replies: limits::INBOX_REPLIES,
     report: limits::INBOX_REPORT,
     outside: limits::INBOX_OUTSIDE,
     joined: limits::INBOX_JOINED,
@@ -176,9 +171,8 @@ pub(super) struct Inbox {
     bounds: InboxBounds,
     lists: Lists,
     held: HeldRoom,
-    /// Answers that wait, and replies, which share a list with notices.
+    /// Answers that wait, which share a list with notices.
     answers: usize,
-    replies: usize,
     /// Notices that wait, by what there may be one of.
     singles: FxHashMap<Single, u32>,
     /// Of each event that the chart waits for the newest report that waits.
@@ -205,13 +199,12 @@ impl Inbox {
 
     fn within(bounds: InboxBounds, declared: impl IntoIterator<Item = EventName>) -> Self {
         let newest: FxHashMap<EventName, Option<u32>> = declared.into_iter().map(|name| (name, None)).collect();
-        let room = bounds.answers + bounds.replies + bounds.report + newest.len() + bounds.outside;
+        let room = bounds.answers + bounds.report + newest.len() + bounds.outside;
         Self {
             bounds,
             lists: Lists::with_room(room + limits::INBOX_SINGLES),
             held: HeldRoom::default(),
             answers: 0,
-            replies: 0,
             singles: FxHashMap::with_capacity_and_hasher(2 * limits::INBOX_SINGLES, rustc_hash::FxBuildHasher),
             newest,
             joined: Vec::with_capacity(bounds.joined),
@@ -236,7 +229,7 @@ impl Inbox {
                 self.dropped.outside += 1;
                 return Err(NotAccepted::Full);
             }
-            Class::Urgent | Class::Reply | Class::Notice | Class::Report => {}
+            Class::Urgent | Class::Notice | Class::Report => {}
         }
         Ok(())
     }
@@ -246,7 +239,7 @@ impl Inbox {
         match class {
             Class::Answer => self.held.answers = self.held.answers.saturating_sub(1),
             Class::Outside => self.held.outside = self.held.outside.saturating_sub(1),
-            Class::Urgent | Class::Reply | Class::Notice | Class::Report => {}
+            Class::Urgent | Class::Notice | Class::Report => {}
         }
     }
 
@@ -254,11 +247,6 @@ impl Inbox {
     pub fn push(&mut self, incoming: Incoming) -> Result<Put, NotAccepted> {
         match incoming.class {
             Class::Urgent => return self.push_urgent(incoming),
-            Class::Reply if self.replies < self.bounds.replies => {
-                self.replies += 1;
-                self.lists.push(List::Words, incoming);
-            }
-            Class::Reply => return Ok(self.push_notice(Incoming { class: Class::Notice, ..incoming })),
             Class::Notice => return Ok(self.push_notice(incoming)),
             Class::Report => return self.push_report(incoming),
             Class::Answer => {
@@ -362,7 +350,6 @@ impl Inbox {
             }
             Class::Notice => _ = self.singles.remove(&single(&incoming)),
             Class::Answer => self.answers -= 1,
-            Class::Reply => self.replies -= 1,
             Class::Report => {
                 if let Some(newest) = self.newest.get_mut(&incoming.event).filter(|newest| **newest == Some(at)) {
                     *newest = None;
@@ -455,7 +442,7 @@ impl Inbox {
         self.lists.clear();
         self.singles.clear();
         self.joined.clear();
-        (self.answers, self.replies) = (0, 0);
+        self.answers = 0;
         self.newest.values_mut().for_each(|newest| *newest = None);
     }
 }

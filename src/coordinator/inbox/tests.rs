@@ -4,7 +4,7 @@ use super::*;
 use crate::model::precedence::taken_first;
 use proptest::prelude::*;
 
-const SMALL: InboxBounds = InboxBounds { answers: 4, replies: 3, report: 3, outside: 4, joined: 2, row: 3, asked: 100 };
+const SMALL: InboxBounds = InboxBounds { answers: 4, report: 3, outside: 4, joined: 2, row: 3, asked: 100 };
 
 /// Names that the chart waits for, and as many that it does not.
 const DECLARED: usize = 3;
@@ -23,8 +23,8 @@ enum Op {
 }
 
 fn class() -> impl Strategy<Value = Class> {
-    use Class::{Answer, Notice, Outside, Reply, Report, Urgent};
-    prop_oneof![1 => Just(Urgent), 1 => Just(Answer), 1 => Just(Reply), 1 => Just(Notice), 3 => Just(Report), 2 => Just(Outside)]
+    use Class::{Answer, Notice, Outside, Report, Urgent};
+    prop_oneof![1 => Just(Urgent), 1 => Just(Answer), 1 => Just(Notice), 3 => Just(Report), 2 => Just(Outside)]
 }
 
 fn ops() -> impl Strategy<Value = Vec<Op>> {
@@ -62,7 +62,7 @@ struct Plain {
 fn list(class: Class) -> List {
     match class {
         Class::Urgent => List::Urgent,
-        Class::Answer | Class::Reply | Class::Notice => List::Words,
+        Class::Answer | Class::Notice => List::Words,
         Class::Report => List::Reports,
         Class::Outside => List::Outside,
     }
@@ -113,10 +113,7 @@ impl Plain {
         list.push(Waits { incoming, tickets, since, ahead: list.len() });
     }
 
-    fn push(&mut self, mut incoming: Incoming) -> Result<Put, NotAccepted> {
-        if incoming.class == Class::Reply && self.count(Class::Reply) >= SMALL.replies {
-            incoming.class = Class::Notice;
-        }
+    fn push(&mut self, incoming: Incoming) -> Result<Put, NotAccepted> {
         let like = |waits: &Waits| waits.incoming.class == incoming.class && waits.incoming.event == incoming.event;
         match incoming.class {
             Class::Urgent => {
@@ -151,7 +148,7 @@ impl Plain {
                 self.add(incoming);
                 return Ok(if newest.is_some() { Put::Displaced } else { Put::Waits });
             }
-            Class::Report | Class::Reply => {}
+            Class::Report => {}
             Class::Answer => match self.answers {
                 0 if !self.has_room(Class::Answer) => return Err(NotAccepted::Full),
                 _ => self.release(Class::Answer),
@@ -201,7 +198,7 @@ fn run(ops: &[Op]) {
     for (number, op) in (1..).zip(ops) {
         match *op {
             Op::Push(class, event, state, held) => {
-                let tag = matches!(class, Class::Answer | Class::Reply | Class::Notice)
+                let tag = matches!(class, Class::Answer | Class::Notice)
                     .then_some(Tag { owner: NodeId::ROOT, visit: number })
                     .filter(|_| state > 0);
                 // Of an urgent event not everybody wants to know.
@@ -226,7 +223,6 @@ fn run(ops: &[Op]) {
             Op::Pop => plain.popped(inbox.pop(&mut tickets), &tickets),
         }
         assert!(plain.count(Class::Report) <= SMALL.report + DECLARED);
-        assert!(plain.count(Class::Reply) <= SMALL.replies);
         assert!(plain.count(Class::Answer) + plain.answers <= SMALL.answers);
         assert!(plain.count(Class::Outside) + plain.outside <= SMALL.outside);
         assert_eq!((inbox.dropped().report, inbox.dropped().outside), (plain.lost, plain.refused));
