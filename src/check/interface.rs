@@ -75,6 +75,17 @@ fn events(deployment: &Deployment, charts: &[&Chart], findings: &mut Findings) {
         if SubsystemStanding::WORDS.iter().any(|(word, _)| *word == text) || text.ends_with(IGNORED) {
             let message = format!("`{event}` is told of every subsystem by itself");
             findings.push(Finding::error(COMPOSE_WORD, message).at(*origin).help("give the event another name"));
+        } else if !text.contains('/') && (deployment.looks_like_answer(text) || deployment.names_configuration(text)) {
+            // A parent that raised it would tell what has not happened.
+            let message = match deployment.looks_like_answer(text) {
+                true => format!("`{event}` is an answer: it comes to who asked, and nobody else raises it"),
+                false => {
+                    format!("`{event}` is a configuration, and no event: a coordinator that raises it asks for it")
+                }
+            };
+            findings.push(Finding::error(COMPOSE_WORD, message).at(*origin).help(
+                "list what a transition waits for, or a coordinator raises, of its own: an event that a parent, or who looks on, may know",
+            ));
         }
     }
     for (event, origin) in &interface.accepts {

@@ -101,6 +101,12 @@ fn run_one(
             .filter_map(|site| EventName::new(site.name.as_str()).ok())
             .collect();
         let waited_for: BTreeSet<EventName> = charts.iter().flat_map(|chart| chart.events()).copied().collect();
+        let known = slips::KnownEvents::new(deployment, &universe, &told, &waited_for);
+        for configuration in &deployment.configurations {
+            let near = configuration.confirm.and_then(|confirm| known.confirmed_as(confirm.event));
+            let path = || format!("configurations.{}.confirm", configuration.id);
+            findings.extend(near.map(|near| near.at(configuration.origin).path(path())));
+        }
         for (view, chart) in views.iter().zip(&charts) {
             let known = slips::KnownEvents::new(view, &universe, &told, &waited_for);
             findings.extend(coordinator::check(view, chart, &known));

@@ -3,7 +3,7 @@
 
 use super::links::links;
 use super::universe::Universe;
-use crate::model::codes::{SIMULATED_NOT_USED, SIMULATED_UNHEARD, SIMULATED_UNKNOWN_STEP};
+use crate::model::codes::{SIMULATED_NOT_USED, SIMULATED_UNHEARD, SIMULATED_UNKNOWN_STEP, TYPE_NO_EVENT};
 use crate::model::finding::did_you_mean;
 use crate::model::{
     ChangeKind, ComponentName, Deployment, Finding, Findings, MemberRef, Origin, SimulatedReaction, StepFault,
@@ -128,16 +128,31 @@ pub fn events(deployment: &Deployment, charts: &[&Chart]) -> Findings {
     let confirms = |r: &SimulatedReaction| {
         deployment.configurations.iter().any(|c| c.confirm.is_some_and(|confirm| confirm.event == r.raise))
     };
-    let deaf = |r: &&SimulatedReaction| !heard.contains(r.raise.as_str()) && !confirms(r);
+    let is_told = |event: &str| deployment.looks_like_answer(event) || deployment.names_configuration(event);
+    let forged = deployment.reactions.iter().enumerate().filter(|(_, reaction)| is_told(reaction.raise.as_str()));
+    let forged = forged.filter_map(|(i, reaction)| {
+        let message = deployment.never_from_outside(reaction.raise.as_str())?;
+        Some(
+            Finding::error(TYPE_NO_EVENT, message)
+                .at(reaction.origin)
+                .path(format!("simulated.reactions[{i}]"))
+                .labelled("no event of a component")
+                .help("let it raise an event that a component of that type raises"),
+        )
+    });
+    let deaf = |r: &&SimulatedReaction| {
+        let event = r.raise.as_str();
+        !is_told(event) && !heard.contains(event) && !confirms(r)
+    };
     let told = deployment.reactions.iter().enumerate().filter(|(_, reaction)| deaf(reaction));
-    told.map(|(i, reaction)| {
+    let unheard = told.map(|(i, reaction)| {
         let message = format!("nobody listens to `{}` of `{}`", reaction.raise, reaction.component);
         Finding::warning(SIMULATED_UNHEARD, message)
             .at(reaction.origin)
             .path(format!("simulated.reactions[{i}]"))
             .help(did_you_mean(reaction.raise.as_str(), "events", heard.iter().copied()))
-    })
-    .collect()
+    });
+    forged.chain(unheard).collect()
 }
 
 /// What is wrong with the text of a step. A verb alone means each of its steps.

@@ -121,6 +121,24 @@ impl<'a> KnownEvents<'a> {
         is_slip(raised, near).then_some(near)
     }
 
+    /// That what would confirm a configuration is nearly an event that there is, and none by itself.
+    pub fn confirmed_as(&self, event: EventName) -> Option<Finding> {
+        let text = event.as_str();
+        let deployment = self.deployment;
+        let raised = deployment.reactions.iter().map(|reaction| reaction.raise);
+        let raised = raised.chain(deployment.monitors.iter().flat_map(Monitor::events));
+        let others = raised.chain(self.told.iter().copied()).chain(self.waited_for.iter().copied());
+        let others: BTreeSet<&str> = others.chain(self.declared.iter().copied()).map(|event| event.as_str()).collect();
+        let known = || others.iter().chain(&self.by_components).chain(&self.accepted).copied();
+        if known().any(|known| known == text) {
+            return None;
+        }
+        let near = nearest(text, known()).filter(|near| is_slip(text, near) && !deployment.looks_like_answer(near))?;
+        let finding =
+            Finding::warning(COORD_NEAR_EVENT, format!("`{event}` confirms, and is nearly `{near}`, which there is"));
+        Some(finding.help(format!("did you mean `{near}`? if not, a component or an operator must raise `{event}`")))
+    }
+
     /// That an event which `listed` transitions of a coordinator wait for is nearly one that there is.
     pub fn near(&self, event: EventName, listed: usize) -> Option<Finding> {
         let text = event.as_str();

@@ -193,7 +193,8 @@ codes! {
          them out.";
     COMPOSE_WORD = "compose::word", "an event has a name that is told by itself",
         "`up`, `down`, `failed` and `stranded` are told to a parent of each of its subsystems without anybody raising them \
-         (`left/up`), and so is what ends in `.ignored`. A deployment cannot emit or accept an event called so. Give it another name.";
+         (`left/up`), and so is what ends in `.ignored`. Answers (`park.ok`) come to who asked, and what is called like a configuration asks for it. A deployment \
+         cannot emit or accept an event called so. Give it another name.";
     COMPOSE_NOT_DOWN_AT_FIRST = "compose::not_down_at_first", "a subsystem is not down before it is begun",
         "A deployment is down when all its coordinators are, those of its subsystems too. A subsystem that does not begin in the state that its file \
          names in `shutdown: { down }` is not down before it is begun, or ended: a parent that comes to where it is down without either is stopped \

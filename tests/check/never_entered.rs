@@ -99,3 +99,31 @@ fn an_answer_goes_to_nobody_beside_who_asked() {
     let asked = "    - { src: hurry, tgt: far, events: [e_far], effect: [fast] }\n    - { src: far, tgt: leaving, events: [e_end, fast.ok] }\n";
     assert_eq!(vain(asked), []);
 }
+
+/// What only Davit tells is raised by nobody else: a parent, or a component, that did would tell what has not happened.
+#[test]
+fn nobody_else_raises_an_answer() {
+    let codes = |deployment: &str, conf: &str| {
+        let files = [
+            ("cell.yaml", deployment.to_owned()),
+            ("conf.yaml", conf.to_owned()),
+            ("coord.yaml", coordinator("    - { src: 'on', tgt: hurry, events: [e_fast] }\n")),
+        ];
+        let deployment = load(&Sources::memory(files), "cell.yaml", &[]).deployment.expect("it can be read");
+        let found = check::run(deployment.clone(), &catalogue(&deployment)).findings;
+        found
+            .into_iter()
+            .filter(|finding| finding.severity > Severity::Info)
+            .map(|finding| finding.code.0)
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(codes(DEPLOYMENT, CONFIGURATIONS), [""; 0]);
+    for more in ["accepts: [build.ok]", "accepts: [fast]", "emits: [build.undone]", "emits: [fast]"] {
+        assert!(codes(&format!("{DEPLOYMENT}{more}\n"), CONFIGURATIONS).contains(&"compose::word"), "{more}");
+    }
+    let reaction = "simulated: { reactions: [{ after: create lamp, raise: fast.ok, component: lamp }] }\n";
+    assert!(codes(&format!("{DEPLOYMENT}{reaction}"), CONFIGURATIONS).contains(&"type::no_event"));
+    // And what confirms is not written nearly.
+    let confirm = CONFIGURATIONS.replace("value: 1.0 } }]", "value: 1.0 } }], confirm: { event: e_fsat, within: 1.0 }");
+    assert!(codes(DEPLOYMENT, &confirm).contains(&"coord::near_event"));
+}
