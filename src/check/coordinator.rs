@@ -126,6 +126,14 @@ fn raised(deployment: &Deployment, chart: &Chart, known: &KnownEvents<'_>, findi
     let mut unknown = BTreeSet::new();
     let emits: BTreeSet<EventName> = deployment.emits.iter().map(|(e, _)| *e).collect();
     for site in chart.raises() {
+        if !site.name.as_str().ends_with(UNDO) && !site.scoped && deployment.looks_like_answer(site.name.as_str()) {
+            // Another coordinator that waits for it would be told what has not happened.
+            let message = format!("`{}` is an answer: it comes to who asked, and nobody raises it", site.name);
+            let finding = Finding::error(COORD_UNKNOWN_REQUEST, message).at(site.origin).labelled("raised here");
+            let help = "raise an event of its own, which the other coordinator waits for";
+            findings.push(finding.path(place(chart, site.when)).help(help));
+            continue;
+        }
         let is_known = match Raise::of(site.name, |id| ids.contains(&id.as_str())) {
             Raise::Request(_) => true,
             Raise::UnknownUndo => false,

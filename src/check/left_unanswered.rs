@@ -4,9 +4,9 @@ use super::coordinator::{ask_of, edges};
 use crate::model::codes::COORD_ANSWER_NEVER_COMES;
 use crate::model::finding::Origin;
 use crate::model::{Deployment, EventName, Finding, Findings, Verdict};
-use crate::statechart::{Chart, NodeId, RaiseMoment};
+use crate::statechart::{Chart, EventId, NodeId, RaiseMoment};
 use rustc_hash::FxHashMap;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Of each answer, the states to which it goes; none: who asked on a transition hears it as long as a state around both its ends is active.
 type Owners = FxHashMap<EventName, Option<Vec<NodeId>>>;
@@ -32,23 +32,31 @@ pub fn check(deployment: &Deployment, chart: &Chart, findings: &mut Findings) {
         return;
     }
     let owners = owners(deployment, chart);
-    // Said once of each state that waits for another one's.
-    let mut said: BTreeMap<(NodeId, NodeId), (Origin, Vec<String>)> = BTreeMap::new();
+    // Said once of each state that waits for another one's, and of transitions that nothing else takes.
+    let mut said: BTreeMap<(NodeId, NodeId), (Origin, BTreeSet<String>)> = BTreeMap::new();
     for edge in edges(chart) {
         let (from, _) = chart.ends(edge);
-        for trigger in chart.triggers(edge).unwrap_or(&[]).iter().filter(|_| chart.is_state(from)) {
-            let Ok(event) = EventName::new(&chart.event_text(*trigger)) else { continue };
-            let Some(Some(asking)) = owners.get(&event) else { continue };
+        let Some(triggers) = chart.triggers(edge).filter(|triggers| chart.is_state(from) && !triggers.is_empty())
+        else {
+            continue;
+        };
+        let lost = |trigger: &EventId| {
+            let event = EventName::new(&chart.event_text(*trigger)).ok()?;
+            let asking = owners.get(&event)?.as_ref()?;
             let hears = |owner: &NodeId| chart.is_inside(from, *owner) || chart.is_inside(*owner, from);
-            if let Some(first) = asking.first().filter(|_| !asking.iter().any(hears)) {
-                let (_, events) = said.entry((from, *first)).or_insert_with(|| (chart.edge_origin(edge), Vec::new()));
-                events.push(format!("`{event}`"));
-            }
+            let first = asking.first().filter(|_| !asking.iter().any(hears))?;
+            Some((*first, event))
+        };
+        let Some(all) = triggers.iter().map(lost).collect::<Option<Vec<_>>>() else { continue };
+        for (asking, event) in all {
+            let (_, events) = said.entry((from, asking)).or_insert_with(|| (chart.edge_origin(edge), BTreeSet::new()));
+            events.insert(format!("`{event}`"));
         }
     }
     for ((from, asking), (origin, events)) in said {
         let (here, there) = (chart.fqn(from), chart.fqn(asking));
-        let (events, never) = (events.join(", "), if events.len() == 1 { "never comes" } else { "never come" });
+        let never = if events.len() == 1 { "never comes" } else { "never come" };
+        let events = events.into_iter().collect::<Vec<_>>().join(", ");
         findings.push(
             Finding::warning(
                 COORD_ANSWER_NEVER_COMES,

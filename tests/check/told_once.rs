@@ -123,10 +123,16 @@ fn that_one_was_down_before_anybody_waited_for_it_is_told_where_there_is_too_muc
     let report = checked(hears.clone(), 800_000);
     let stops = said(&report, "coord::no_way_down");
     assert!(stops.len() == 1 && stops[0].0 == "from `root.alive.five` no way leads to `off`", "{stops:?}");
-    let hears = hears.replace("three: { entry: [port/e_off, star/e_off] }", "three: {}").replace(
-        "tgt: .alive.three, events: [e_end]",
-        "tgt: .alive.three, events: [e_end], effect: [port/e_off, star/e_off]",
-    );
+    let inside = "low: { entry: [port/e_off, star/e_off], states: { three: {}, four: {}, five: {} }, transitions: [
+          { src: initial, tgt: three },
+          { src: three, tgt: four, events: [port/down, port/e_off.ignored] },
+          { src: three, tgt: five, events: [star/down, star/e_off.ignored] }] }";
+    let hears = TWO_COORDINATOR
+        .replace("three: { entry: [port/e_off, star/e_off] }\n        four: {}", inside)
+        .replace("        - { src: three, tgt: four, events: [port/down, port/e_off.ignored] }\n", "")
+        .replace(".alive.three", ".alive.low")
+        .replace(".alive.four", ".alive.low.four")
+        + "    - { src: .alive.low.five, tgt: off, events: [port/down, port/e_off.ignored] }\n";
     let report = checked(hears, 800_000);
     assert_eq!(said(&report, "coord::no_way_down"), []);
     assert!(matches!(report.verdict, CheckVerdict::Followed { .. }), "{:#?}", report.findings);
