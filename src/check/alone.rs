@@ -2,7 +2,7 @@
 
 use crate::model::codes::CONF_ALONE_IN_GROUP;
 use crate::model::finding::nearest;
-use crate::model::{Configuration, Deployment, Finding, Findings, Ident, Severity};
+use crate::model::{Configuration, Deployment, Finding, Findings, Ident};
 
 /// Who is alone in its group, where another group has nearly that name.
 pub fn check(deployment: &Deployment) -> Findings {
@@ -19,9 +19,7 @@ pub fn check(deployment: &Deployment) -> Findings {
 
 fn finding(alone: &Configuration, group: Ident, near: &str, other: &Configuration) -> Finding {
     let message = format!("only `{}` is of the group `{group}`, so it replaces nothing", alone.id);
-    // One that is safe, and does not take the place of what it was to take the place of, is no matter of taste.
-    let severity = if alone.safe { Severity::Warning } else { Severity::Info };
-    Finding::new(severity, CONF_ALONE_IN_GROUP, message)
+    Finding::info(CONF_ALONE_IN_GROUP, message)
         .at(alone.origin)
         .also(other.origin, format!("`{}` is of the group `{near}`", other.id))
         .path(format!("configurations.{}.group", alone.id))

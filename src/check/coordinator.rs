@@ -1,6 +1,5 @@
 //! The coordinator against the deployment: what it asks for, what it waits for, which states the deployment names.
 
-use super::left_unanswered;
 use super::paths;
 use super::slips::KnownEvents;
 use crate::model::codes::{
@@ -33,7 +32,6 @@ pub fn check(deployment: &Deployment, chart: &Chart, known: &KnownEvents<'_>) ->
     states(deployment, chart, &mut findings);
     raised(deployment, chart, known, &mut findings);
     heard(deployment, chart, known, &mut findings);
-    left_unanswered::check(deployment, chart, &mut findings);
     findings
 }
 
@@ -126,7 +124,8 @@ fn raised(deployment: &Deployment, chart: &Chart, known: &KnownEvents<'_>, findi
     let mut unknown = BTreeSet::new();
     let emits: BTreeSet<EventName> = deployment.emits.iter().map(|(e, _)| *e).collect();
     for site in chart.raises() {
-        if !site.name.as_str().ends_with(UNDO) && !site.scoped && deployment.looks_like_answer(site.name.as_str()) {
+        let name = site.name.as_str();
+        if !site.scoped && Verdict::split(name).is_some() && deployment.looks_like_answer(name) {
             // Another coordinator that waits for it would be told what has not happened.
             let message = format!("`{}` is an answer: it comes to who asked, and nobody raises it", site.name);
             let finding = Finding::error(COORD_UNKNOWN_REQUEST, message).at(site.origin).labelled("raised here");

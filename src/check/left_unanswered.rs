@@ -27,9 +27,10 @@ fn owners(deployment: &Deployment, chart: &Chart) -> Owners {
 }
 
 /// Transitions that wait for an answer where it never comes.
-pub fn check(deployment: &Deployment, chart: &Chart, findings: &mut Findings) {
+pub fn check(deployment: &Deployment, chart: &Chart) -> Findings {
+    let mut findings = Findings::new();
     if !chart.is_pure() {
-        return;
+        return findings;
     }
     let owners = owners(deployment, chart);
     // Said once of each state that waits for another one's, and of transitions that nothing else takes.
@@ -69,4 +70,5 @@ pub fn check(deployment: &Deployment, chart: &Chart, findings: &mut Findings) {
             )),
         );
     }
+    findings
 }

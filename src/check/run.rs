@@ -15,9 +15,9 @@ use super::report::{Accepted, Explored, Report};
 use super::state::Failed;
 use super::verdict::CheckVerdict;
 use super::{
-    alone, composed, configurations as single, coordinator, coupling, declared, interface, led_on, library,
-    monitors as watched, moves_back, paths, purity, safety, settings, simulated, slips, types, unasked, undriven,
-    unhandled, universe, unwatched, ways,
+    alone, composed, configurations as single, coordinator, coupling, declared, interface, led_on, left_unanswered,
+    library, monitors as watched, moves_back, paths, purity, safety, settings, simulated, slips, types, unasked,
+    undriven, unhandled, universe, unwatched, ways,
 };
 use crate::model::codes::{CLASH, COORD_NO_WAY_DOWN, POST_ON_DESTROYED, PRE_ON_CREATED, TOUCHES_DESTROYED};
 use crate::model::naming::Naming;
@@ -111,6 +111,7 @@ fn run_one(
             let known = slips::KnownEvents::new(view, &universe, &told, &waited_for);
             findings.extend(coordinator::check(view, chart, &known));
             findings.extend(unhandled::check(view, chart));
+            findings.extend(left_unanswered::check(view, chart));
             findings.extend(led_on::check(view, chart));
             findings.extend(purity::check(view));
         }
