@@ -57,20 +57,6 @@ fn may_be_ignored(state: &mut ProductState, child: &Child, (by, emitted): (usize
     }
 }
 
-/// One of which nothing else is known is begun before it was heard to be down: that it is, heard next, is of the life before.
-fn begun_anew(state: &mut ProductState, child: &Child) {
-    if child.beliefs.is_none() && !state.offered.iter().any(|of| of.event == child.begins) {
-        let begun = RaisedForChild { event: child.begins, by: 0, owner: NodeId::ROOT, waits: OF_ANOTHER };
-        state.change(|seldom| seldom.offered.push(begun));
-    }
-}
-
-fn is_of_life_before(state: &mut ProductState, child: &Child) -> bool {
-    let Some(at) = state.offered.iter().position(|of| of.event == child.begins) else { return false };
-    state.change(|seldom| seldom.offered.remove(at));
-    true
-}
-
 /// A coordinator hears that one of those was ignored: whether that is of this life.
 fn is_of_this_life(state: &mut ProductState, child: &Child, by: usize) -> bool {
     let own = |of: &RaisedForChild| of.event == child.ends && of.by == index(by);
@@ -88,14 +74,17 @@ impl Product<'_> {
                     state.children |= promised(at);
                 }
             } else if child.is_down_by(name) && is_of_this_life(state, child, by) && is_over(state, child, at) {
-                // That it is down may be told behind that.
-                let down = if state.children & begun(at) != 0 { promised(at) | released(at) } else { 0 };
+                // Of another one that was raised it may be told behind that that it led down.
+                let more = state.children & begun(at) != 0 && state.offered.iter().any(|of| of.event == child.ends);
+                let down = if more { promised(at) | released(at) } else { 0 };
                 state.children = state.children & !(promised(at) | begun(at) | released(at)) | down;
-            } else if name == child.down && is_of_life_before(state, child) {
-                state.children &= !(promised(at) | released(at));
             } else if name == child.down
                 || child.is_known_down(name, state.beliefs.get(at).copied().unwrap_or_default())
             {
+                // What is ignored now says nothing: that it was heard is known.
+                if state.offered.iter().any(|of| of.event == child.ends) {
+                    state.change(|seldom| seldom.offered.retain(|of| of.event != child.ends));
+                }
                 state.children &= !(promised(at) | begun(at) | released(at));
             }
         }
@@ -122,9 +111,8 @@ impl Product<'_> {
                 raised_anew(state, at, name == child.begins, name == child.ends);
             }
             if name == child.begins {
-                match state.children & begun(at) == 0 {
-                    true => state.children &= !(promised(at) | released(at)),
-                    false => begun_anew(state, child),
+                if state.children & begun(at) == 0 {
+                    state.children &= !(promised(at) | released(at));
                 }
                 if state.children & begun(at) != 0 && !child.holds.is_empty() {
                     state.children |= DOUBT;
@@ -154,14 +142,11 @@ impl Product<'_> {
         let told = |child: &Child| name.local(child.path).is_some_and(|own| !own.ends_with(IGNORED));
         // Where it is known what it may tell, that says so.
         let unknown = |child: &Child| child.beliefs.is_none() || !child.ends_unbegun;
-        let silent = |at: usize, child: &Child| {
+        children.any(|(at, child)| {
             let unbegun =
                 state.children & begun(at) == 0 && !(name == child.down && state.children & released(at) != 0);
             told(child) && unknown(child) && !child.wakes && unbegun
-                // Nothing is ignored that was not raised.
-                || child.is_down_by(name) && !state.offered.iter().any(|of| of.event == child.ends)
-        };
-        children.any(|(at, child)| silent(at, child))
+        })
     }
 
     /// Whether it is known when an event comes that a subsystem tells.
