@@ -74,17 +74,12 @@ impl Product<'_> {
                     state.children |= promised(at);
                 }
             } else if child.is_down_by(name) && is_of_this_life(state, child, by) && is_over(state, child, at) {
-                // Of another one that was raised it may be told behind that that it led down.
-                let more = state.children & begun(at) != 0 && state.offered.iter().any(|of| of.event == child.ends);
-                let down = if more { promised(at) | released(at) } else { 0 };
+                // That it is down may be told behind that.
+                let down = if state.children & begun(at) != 0 { promised(at) | released(at) } else { 0 };
                 state.children = state.children & !(promised(at) | begun(at) | released(at)) | down;
             } else if name == child.down
                 || child.is_known_down(name, state.beliefs.get(at).copied().unwrap_or_default())
             {
-                // What is ignored now says nothing: that it was heard is known.
-                if state.offered.iter().any(|of| of.event == child.ends) {
-                    state.change(|seldom| seldom.offered.retain(|of| of.event != child.ends));
-                }
                 state.children &= !(promised(at) | begun(at) | released(at));
             }
         }
@@ -142,11 +137,14 @@ impl Product<'_> {
         let told = |child: &Child| name.local(child.path).is_some_and(|own| !own.ends_with(IGNORED));
         // Where it is known what it may tell, that says so.
         let unknown = |child: &Child| child.beliefs.is_none() || !child.ends_unbegun;
-        children.any(|(at, child)| {
+        let silent = |at: usize, child: &Child| {
             let unbegun =
                 state.children & begun(at) == 0 && !(name == child.down && state.children & released(at) != 0);
             told(child) && unknown(child) && !child.wakes && unbegun
-        })
+                // Nothing is ignored that was not raised.
+                || child.is_down_by(name) && !state.offered.iter().any(|of| of.event == child.ends)
+        };
+        children.any(|(at, child)| silent(at, child))
     }
 
     /// Whether it is known when an event comes that a subsystem tells.
