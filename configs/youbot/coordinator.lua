@@ -244,11 +244,11 @@ return state {
     trans { src = ".sync.copying.eight_DOF_mode", tgt = ".unsync.for_eight", events = { "e_link_lost" } },
     trans { src = ".sync.copying.five_DOF_mode",  tgt = ".unsync.for_five",  events = { "e_link_lost" } },
     trans { src = ".sync.copying", tgt = "soft_stop", events = { "e_force_spike" } },
-    trans { src = "soft_stop", tgt = "unsync",    events = { "e_reset" } },
+    trans { src = "soft_stop", tgt = ".unsync.for_five", events = { "e_reset" } },
   },
 
   -- Stopped in operation. When it is released the drives are asked to take torques, whatever they did meanwhile, and nothing
-  -- couples before the arms are aligned again.
+  -- couples before the arms are aligned again; then with five degrees of freedom, whatever it was before: a base that yields is asked for anew.
   fault = stopped({
     clearing  = state { entry = "clear_faults" },
     losing    = state { entry = "safe_hold",
@@ -378,7 +378,7 @@ return state {
           events = { "e_drives_let_go", "five_DOF.failed", "five_DOF.broken", "eight_DOF.broken", "base_stop.failed", "base_stop.broken",
                      "enable_copying.broken", "disable_copying.failed", "disable_copying.broken" } },
   trans { src = "operational", tgt = "fault.losing", events = { "e_controller_lost" } },
-  trans { src = "fault.resuming",            tgt = "operational",   events = { "resume.ok" } },
+  trans { src = "fault.resuming",            tgt = "operational.unsync.for_five", events = { "resume.ok" } },
   trans { src = "fault.resuming",            tgt = "shutting_down", events = { "e_shutdown" } },
   trans { src = "fault.releasing.leaving",   tgt = "shutting_down.quieting.released", events = { "safe_hold.undone" } },
   trans { src = "fault.releasing.freed",     tgt = "shutting_down.quieting.released", events = { "e_shutdown" } },

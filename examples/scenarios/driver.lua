@@ -1,7 +1,7 @@
 -- What the drives tell that is wrong with them, each while both robots copy:  davit run examples/scenarios/driver.lua --clock simulated
 --
 -- The fault comes from the world, at a time of the clock. The robot stops; the other one lets go and is not stopped. After `e_reset` the
--- drives take torques again before anything couples.
+-- drives take torques again before anything couples, and the base yields no more until somebody asks for it.
 
 local FAULTS = { "overcurrent", "undervoltage", "overtemp", "hall", "sine_comm", "i2t", "ec_timeout", "encoder", "emergency" }
 local EVENTS = { overcurrent = "e_OVERCURRENT", undervoltage = "e_UNDERVOLTAGE", overtemp = "e_OVERTEMP", hall = "e_HALL_ERR",
@@ -39,8 +39,10 @@ for _, fault in ipairs(FAULTS) do
   set("left/Operator.script", "align 8; free 600", { force = true, within = 1 })
   raise("left/e_reset")
   wait_state("left:operational", 0.1)
-  wait_state("left:copying", 20)
+  wait_state("left:five_DOF_mode", 20)
   wait(0.5)
+  raise("left/e_8dof")
+  wait_state("left:eight_DOF_mode", 0.1)
   s:stop()
   local x, y, z, times = s:values("x"), s:values("y"), s:values("z"), s:times()
   local mode, active = s:values("mode"), s:values("active")

@@ -315,6 +315,9 @@ codes! {
         "A configuration is asked for by its name, and this one has none that could be used: it is not held by \
          `ConfiguratorConf`, or another one of the same name took its place in the table (Lua keeps the last). One \
          configuration alone in its file takes the file's name.";
+    CONF_RESERVED = "conf::reserved_name", "a configuration has a name that means something else",
+        "A coordinator asks for a configuration by its name. `undo` there asks for undoing what was applied last, and `e_done` is the \
+         event of a state whose activity is over: a configuration of such a name could not be asked for. Choose another name.";
     CONF_DUPLICATE = "conf::duplicate", "two configurations have the same name",
         "A request names one configuration, so names are unique in a deployment, over all its files. Rename one of \
          them, and the requests for it.";

@@ -641,8 +641,54 @@ fn random(seed: u64) -> Vec<(&'static str, &'static str, String)> {
     changes
 }
 
+/// The same with arms that are passed on: one level more on one side, or on both.
+fn random_of_two_levels(seed: u64) -> Vec<(&'static str, &'static str, String)> {
+    let mut changes = random(seed);
+    // Each side by a bit of the seed, and what the one in between does otherwise by what is left of it.
+    let (sides, does) = (seed % 3, seed / 3);
+    // What is in between does not tell when it is built.
+    changes.retain(|(_, _, after)| sides == 0 || !after.contains("right/e_built"));
+    let mut swap = |file, before, after: &str| changes.push((file, before, after.to_owned()));
+    if sides != 1 {
+        swap(
+            "pair.yaml",
+            "left: { deployment: arm.yaml, parameters: { gain: 0.7 } }",
+            "left: { deployment: mid.yaml }",
+        );
+    }
+    if sides != 0 {
+        swap("pair.yaml", "right: { deployment: arm.yaml }", "right: { deployment: mid.yaml }");
+    }
+    match does % 5 {
+        // Not heard when what is within comes down by itself.
+        1 => swap("mid.lua", "events = { 'e_shutdown', 'inner/e_leaving' }", "events = { 'e_shutdown' }"),
+        2 => swap(
+            "mid.lua",
+            "entry = { 'inner/e_shutdown', 'inner/e_released' }",
+            "entry = { 'inner/e_released', 'inner/e_shutdown' }",
+        ),
+        // It lets go before it is let go itself.
+        3 => swap(
+            "mid.lua",
+            "leaving = state { entry = 'e_leaving' }",
+            "leaving = state { entry = { 'inner/e_shutdown', 'e_leaving' } }",
+        ),
+        _ => {}
+    }
+    changes
+}
+
 #[test]
 fn what_is_accepted_file_by_file_is_refused_by_no_product() {
+    accepted_by_no_product_refused(random);
+}
+
+#[test]
+fn what_is_accepted_at_two_levels_is_refused_by_no_product() {
+    accepted_by_no_product_refused(random_of_two_levels);
+}
+
+fn accepted_by_no_product_refused(random: fn(u64) -> Vec<(&'static str, &'static str, String)>) {
     let (mut accepted, mut refused) = (0, 0);
     for seed in 1..60 {
         let changes = random(seed);

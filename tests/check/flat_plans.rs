@@ -1,4 +1,4 @@
-//! A composed deployment and the same system written flat by hand give the same plans, step for step: random subsystems of one file.
+//! A composed deployment and the same system written flat by hand give the same plans, step for step: random subsystems, of up to three levels.
 
 use davit::app;
 use davit::lang::LoadOptions;
@@ -68,41 +68,88 @@ pub fn planned(file: &Path, ids: &[String]) -> Vec<String> {
     steps.map(|planned| format!("{} undone by {:?}", planned.step, planned.undo)).collect()
 }
 
+fn head(name: &str, keys: &str) -> String {
+    format!("davit: 1\nname: {name}\nplatform: simulated\n{keys}{TYPES}{REST}")
+}
+
+/// What the files of the part at `path` are called.
+fn stem(path: &str) -> String {
+    if path.is_empty() { "whole".to_owned() } else { format!("of_{}", path.trim_end_matches('/').replace('/', "_")) }
+}
+
+/// A file of the composition as its parent sees it, and what it is when the whole is written flat.
+struct Part {
+    /// What is exported: an out-port, an in-port and a property, by the names they have in the whole.
+    exported: [String; 3],
+    flat: String,
+    /// In the order in which they are planned.
+    ids: Vec<String>,
+}
+
+/// Writes the files of a part and of all that is below it; `path` is where it is in the whole, with a slash behind it.
+fn part(folder: &Path, chance: &mut Chance, path: &str, levels: u64) -> Part {
+    let stem = stem(path);
+    let write = |name: &str, text: &str| std::fs::write(folder.join(name), text).unwrap();
+    let own = chance.below(1000) + 1;
+    let (mut text, mut flat) = (configurations(own, ""), configurations(own, path));
+    let (mut ids, mut subsystems, mut below) = (Vec::new(), String::new(), Vec::new());
+    // The whole has two at least; what is farther down one, two or none.
+    let many = match levels {
+        0 => 0,
+        _ if path.is_empty() => 2 + chance.below(2),
+        _ => chance.below(3),
+    };
+    for name in ["left", "right", "third"].into_iter().take(usize::try_from(many).unwrap()) {
+        let child = part(folder, chance, &format!("{path}{name}/"), levels - 1);
+        flat += &child.flat;
+        ids.extend(child.ids);
+        _ = writeln!(subsystems, "  {name}: {{ deployment: {}.yaml }}", self::stem(&format!("{path}{name}/")));
+        below.push((name, child.exported));
+    }
+    ids.extend(["make", "run", "tune"].map(|id| format!("{path}{id}")));
+    let mut exported = ["C0.a", "C1.b", "C1.k"].map(|own| (own.to_owned(), format!("{path}{own}")));
+    if let (Some((first, out)), Some((last, to))) = (below.first(), below.last()) {
+        let couple = |id: &str, out: &str, to: &str, k: &str| {
+            format!("[\"{id}\"] = Configuration {{ connect(\"{out}\", \"{to}\"), property_set(\"{k}\", 7.0) }},")
+        };
+        text += &couple("couple", &format!("{first}.out"), &format!("{last}.ref"), &format!("{last}.k"));
+        flat += &couple(&format!("{path}couple"), &out[0], &to[1], &to[2]);
+        ids.push(format!("{path}couple"));
+        // What is exported is its own, or handed on.
+        for (at, name) in ["out", "ref", "k"].into_iter().enumerate() {
+            if chance.below(2) == 0 {
+                exported[at] = (format!("{first}.{name}"), out[at].clone());
+            }
+        }
+    }
+    let [out, to, k] = exported.each_ref().map(|(own, _)| own);
+    let mut keys = format!(
+        "configurations: [{stem}.lua]\nexports: {{ ports: {{ out: {out}, ref: {to} }}, properties: {{ k: {k} }} }}\n"
+    );
+    if !below.is_empty() {
+        _ = write!(keys, "subsystems:\n{subsystems}");
+    }
+    write(&format!("{stem}.lua"), &format!("ConfiguratorConf {{ {text} }}"));
+    write(&format!("{stem}.yaml"), &head(&stem, &keys));
+    Part { exported: exported.map(|(_, whole)| whole), flat, ids }
+}
+
 #[test]
 fn composed_and_written_flat_the_steps_are_the_same() {
-    let names = ["left", "right", "third"];
-    for seed in 1..40_u64 {
+    let (mut three_levels, mut handed_on) = (0, 0);
+    for seed in 1..60_u64 {
         let mut chance = Chance(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1);
         let folder = tempfile::tempdir().unwrap();
         let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
-        let head = |name: &str, keys: &str| format!("davit: 1\nname: {name}\nplatform: simulated\n{keys}{TYPES}{REST}");
-        let many = 2 + usize::try_from(chance.below(2)).unwrap();
-        let seeds: Vec<u64> = (0..many).map(|_| chance.below(1000) + 1).collect();
         write("c.lua", "return state { idle = state {}, trans { src = \"initial\", tgt = \"idle\" } }");
-        let (mut flat, mut ids, mut subsystems) = (String::new(), Vec::new(), String::new());
-        for (name, own) in names.iter().zip(&seeds) {
-            write(&format!("{name}.lua"), &format!("ConfiguratorConf {{ {} }}", configurations(*own, "")));
-            let keys = format!(
-                "configurations: [{name}.lua]\nexports: {{ ports: {{ out: C0.a, ref: C1.b }}, properties: {{ k: C1.k }} }}\n"
-            );
-            write(&format!("{name}.yaml"), &head(name, &keys));
-            flat += &configurations(*own, &format!("{name}/"));
-            _ = writeln!(subsystems, "  {name}: {{ deployment: {name}.yaml }}");
-            ids.extend(["make", "run", "tune"].map(|id| format!("{name}/{id}")));
-        }
-        let last = names[many - 1];
-        let couple = |out: &str, to: &str, k: &str| {
-            format!(
-                "couple = Configuration {{ connect(\"left{out}\", \"{last}{to}\"), property_set(\"{last}{k}\", 7.0) }},"
-            )
-        };
-        ids.push("couple".to_owned());
-        write("whole.lua", &format!("ConfiguratorConf {{ {} }}", couple(".out", ".ref", ".k")));
-        write("whole.yaml", &head("whole", &format!("configurations: [whole.lua]\nsubsystems:\n{subsystems}")));
-        write("flat.lua", &format!("ConfiguratorConf {{ {flat} {} }}", couple("/C0.a", "/C1.b", "/C1.k")));
+        let whole = part(folder.path(), &mut chance, "", 1 + seed % 3);
+        write("flat.lua", &format!("ConfiguratorConf {{ {} }}", whole.flat));
         write("flat.yaml", &head("whole", "configurations: [flat.lua]\n"));
-        let composed = planned(&folder.path().join("whole.yaml"), &ids);
+        let composed = planned(&folder.path().join("whole.yaml"), &whole.ids);
         assert!(composed.len() > 10, "{seed}: {composed:?}");
-        assert_eq!(composed, planned(&folder.path().join("flat.yaml"), &ids), "{seed}");
+        assert_eq!(composed, planned(&folder.path().join("flat.yaml"), &whole.ids), "{seed}");
+        three_levels += u32::from(whole.ids.iter().any(|id| id.matches('/').count() == 3));
+        handed_on += u32::from(whole.exported.iter().any(|name| name.contains('/')));
     }
+    assert!(three_levels > 10 && handed_on > 10, "{three_levels} {handed_on}");
 }

@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Each with what is set for it here: what takes a minute in the file is shorter.
-const SCENARIOS: [(&str, &[(&str, &str)]); 34] = [
+const SCENARIOS: [(&str, &[(&str, &str)]); 35] = [
     ("beside", &[]),
     ("blocked", &[]),
     ("bring_up", &[]),
@@ -31,6 +31,7 @@ const SCENARIOS: [(&str, &[(&str, &str)]); 34] = [
     ("one_stops", &[]),
     ("one_way", &[]),
     ("parked_in_contact", &[]),
+    ("payload", &[]),
     ("peer_restart", &[]),
     ("pressed", &[]),
     ("push", &[]),
@@ -217,6 +218,11 @@ fn peer_restart() {
 #[test]
 fn parked_in_contact() {
     run("parked_in_contact");
+}
+
+#[test]
+fn payload() {
+    run("payload");
 }
 
 #[test]

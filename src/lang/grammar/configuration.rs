@@ -132,7 +132,7 @@ pub static CONFIRM: Object = Object {
         key(
             "event",
             Form::Name(NameKind::Event),
-            "The event.",
+            "The event. It confirms from the moment on at which the configuration begins to be applied.",
             "event = \"e_aligned\"",
             ("event: \"e a\"", TEXT_BAD_NAME),
         )

@@ -24,6 +24,10 @@ fn required(cx: &mut Cx, fields: &mut Fields, key: &'static str) -> Option<Node>
     fields.needed(cx, key, help)
 }
 
+/// Names that mean something else where a coordinator asks for a configuration, with what.
+const RESERVED: [(&str, &str); 2] =
+    [("undo", "it asks for undoing what was applied last"), ("e_done", "it is raised when a state's activity is over")];
+
 /// A map of named configurations, in the order given.
 pub fn configurations(cx: &mut Cx, node: Node) -> Vec<Configuration> {
     let example =
@@ -47,9 +51,17 @@ pub fn configurations(cx: &mut Cx, node: Node) -> Vec<Configuration> {
         let origin = if matches!(entry.value.kind, Kind::Made(..)) { entry.value.origin } else { entry.origin };
         let before = cx.findings.len();
         let id = own_name::<ConfigId>(cx, &entry, "a configuration's name", "enable_copying");
+        let reserved = RESERVED.iter().find(|(name, _)| *name == &*entry.key);
+        if let Some((name, means)) = reserved {
+            let finding = Finding::error(codes::CONF_RESERVED, format!("a configuration cannot be called `{name}`"));
+            let place = cx.part(entry.origin, &entry.key);
+            cx.report(
+                finding.at(place).labelled(format!("where a coordinator names it, {means}")).help("take another name"),
+            );
+        }
         // Without a name its inside is still looked at, so that all findings come at once.
         let inside = configuration(cx, id.unwrap_or_else(unnamed), entry.value, origin);
-        if let (Some(_), Some(configuration)) = (id, inside) {
+        if let (Some(_), Some(configuration), None) = (id, inside, reserved) {
             all.push(configuration);
         }
         concern::all(cx, before, &entry.key);

@@ -157,9 +157,10 @@ impl RobotBody {
         }
     }
 
-    /// From now on the masses of its arm are this multiple of the nominal ones: a robot as it may be, or one that takes up a load.
-    pub fn weigh(&mut self, mass_scale: f64) {
-        self.arm.model = ArmModel::youbot(GRIPPER.mass, mass_scale);
+    /// From now on the masses of its arm are this multiple of the nominal ones, a robot as it may be, and at its tool are `payload` kg, the gripper
+    /// included: more, when it takes something up.
+    pub fn weigh(&mut self, mass_scale: f64, payload: f64) {
+        self.arm.model = ArmModel::youbot(payload, mass_scale);
     }
 
     /// Where the tool is in the world, and how it moves.

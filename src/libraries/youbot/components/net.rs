@@ -23,7 +23,7 @@ pub(super) struct NetworkProperties {
     clock_offset: Prop<f64>,
     clock_drift: Prop<f64>,
     seed: Prop<i64>,
-    faults: NetworkFaults,
+    pub(super) faults: NetworkFaults,
 }
 
 impl NetworkProperties {
@@ -154,7 +154,7 @@ impl Component for Net {
         let now = cx.now().as_secs_f64();
         self.network.quality = self.properties.quality(cx.now());
         while let Some(packet) = self.rx.take() {
-            self.network.send(now, packet);
+            self.network.send(now, self.properties.faults.sent_for(cx.now(), packet));
         }
         let ahead = self.properties.clock_difference(now);
         while let Some(packet) = self.network.receive(now) {

@@ -32,6 +32,14 @@ pub(super) fn offer_network_faults<C: Component>(
             Ok(())
         });
     }
+    b.doc("The tool's position is wrong by so much in what is sent, for that time (0: until heal). All else of a packet is right.")
+        .unit("m")
+        .range(-10.0..=10.0)
+        .parameter("by", None::<[f64; 3]>);
+    seconds(b).injection("corrupt", move |c, cx, (by, seconds): ([f64; 3], f64)| {
+        of(c).displace(by, end(cx.now(), seconds));
+        Ok(())
+    });
     b.doc("Nothing that was injected is wrong with the network any more.").injection("heal", move |c, _, (): ()| {
         of(c).heal();
         Ok(())

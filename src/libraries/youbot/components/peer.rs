@@ -179,7 +179,7 @@ impl Component for Peer {
         p.delay_damping = DELAY_DAMPING;
         w.robot.dynamics.parameters.force_gain = self.force_gain.get();
         while let Some(packet) = self.rx.take() {
-            w.to_peer.send(now, packet);
+            w.to_peer.send(now, self.network.faults.sent_for(cx.now(), packet));
         }
         let mut state = (false, false);
         let steps = (cx.dt() / CONTROL_PERIOD).round().max(1.0) as u32;
@@ -203,7 +203,7 @@ impl Component for Peer {
                 yields: w.robot.dynamics.parameters.yields(),
                 energy: w.robot.impedance.energy_sent(),
             };
-            w.from_peer.send(now, packet);
+            w.from_peer.send(now, self.network.faults.sent_for(cx.now(), packet));
         }
         while let Some(packet) = w.from_peer.receive(now) {
             self.tx.write(seen_by(packet, ahead));

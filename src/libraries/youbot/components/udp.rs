@@ -93,7 +93,7 @@ impl Component for Udp {
         let now = cx.now().as_secs_f64();
         self.outgoing.quality = self.faults.over(cx.now(), Quality::default());
         while let Some(packet) = self.rx.take() {
-            self.outgoing.send(now, packet);
+            self.outgoing.send(now, self.faults.sent_for(cx.now(), packet));
         }
         while let Some(packet) = self.outgoing.receive(now) {
             let sent = if link.send(&packet) { &mut self.counted.sent } else { &mut self.counted.unsent };

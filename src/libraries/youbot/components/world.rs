@@ -2,7 +2,7 @@
 
 use super::aged;
 use super::samples::{PlantCommand, PlantState, ToolPose, ToolTwist, stamp};
-use crate::libraries::youbot::parameters::PARK_POSE_DEG;
+use crate::libraries::youbot::parameters::{GRIPPER, PARK_POSE_DEG};
 use crate::libraries::youbot::rigid_body::{J5, radians};
 use crate::libraries::youbot::world::{Bar, FAR, PLANT_STEP, RobotBody, Surroundings};
 use crate::model::{EventName, Tunable};
@@ -28,6 +28,7 @@ struct WorldRobot {
     torque: Out<J5>,
     q_start: Prop<J5>,
     mass_scale: Prop<f64>,
+    payload: Prop<f64>,
     friction_scale: Prop<f64>,
     torque_lag: Prop<f64>,
     table: Prop<f64>,
@@ -68,6 +69,11 @@ impl WorldRobot {
                 .doc("Masses of its arm, as a multiple of the nominal ones.")
                 .range(0.1..=3.0)
                 .property(&named("mass_scale"), 1.0),
+            payload: b
+                .doc("Mass at its tool, the gripper included. It may be taken up and put down at any time.")
+                .unit("kg")
+                .range(0.0..=3.0)
+                .property(&named("payload"), GRIPPER.mass),
             friction_scale: b
                 .doc("Its friction, as a multiple of the nominal one.")
                 .range(0.0..=10.0)
@@ -105,8 +111,8 @@ impl WorldRobot {
         let command = command.map_or(PlantCommand { braked: true, ..PlantCommand::default() }, |(command, _)| command);
         let push = aged(&mut self.ext_force, cx).filter(|(_, age)| *age <= PUSH_STALE);
         let push = push.map(|(force, _)| force).unwrap_or_default();
-        if self.mass_scale.changed() {
-            self.body.weigh(self.mass_scale.get());
+        if self.mass_scale.changed() | self.payload.changed() {
+            self.body.weigh(self.mass_scale.get(), self.payload.get());
         }
         self.body.arm.friction_scale = self.friction_scale.get();
         self.body.torque_lag = self.torque_lag.get();
@@ -157,6 +163,7 @@ impl Component for YoubotWorld {
         .on_configure(|c, _| {
             for place in &mut c.places {
                 place.body = RobotBody::new(place.q_start.get(), place.mass_scale.get());
+                place.body.weigh(place.mass_scale.get(), place.payload.get());
                 (place.held_at, place.braked, place.is_there) = (None, false, false);
             }
             c.put_bar();

@@ -1,6 +1,7 @@
 //! What goes wrong with a network for a time, whatever it should be like; then it is as it should be again.
 
 use super::Quality;
+use crate::libraries::youbot::link::Packet;
 use crate::time::Time;
 
 /// What may go wrong with it.
@@ -28,14 +29,22 @@ impl NetworkFault {
         [Self::Cut, Self::Delay, Self::Jitter, Self::Reorder, Self::Duplicate, Self::Loss, Self::Rate];
 }
 
-/// Those that are in force, each with its figure and its end.
+/// Those that are in force, each with its figure and its end; and by how much (m) the tool's position is wrong in what is sent.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct NetworkFaults([Option<(f64, Time)>; NetworkFault::ALL.len()]);
+pub struct NetworkFaults {
+    figures: [Option<(f64, Time)>; NetworkFault::ALL.len()],
+    displaced: Option<([f64; 3], Time)>,
+}
 
 impl NetworkFaults {
     /// It goes wrong until then; what is told of the same fault later counts.
     pub fn begin(&mut self, fault: NetworkFault, figure: f64, until: Time) {
-        self.0[fault as usize] = Some((figure, until));
+        self.figures[fault as usize] = Some((figure, until));
+    }
+
+    /// The tool's position is wrong by so much until then.
+    pub fn displace(&mut self, by: [f64; 3], until: Time) {
+        self.displaced = Some((by, until));
     }
 
     /// Nothing is wrong any more.
@@ -45,7 +54,7 @@ impl NetworkFaults {
 
     /// How a network is at `now` that should be so.
     pub fn over(&mut self, now: Time, mut quality: Quality) -> Quality {
-        for (fault, begun) in NetworkFault::ALL.into_iter().zip(&mut self.0) {
+        for (fault, begun) in NetworkFault::ALL.into_iter().zip(&mut self.figures) {
             *begun = begun.filter(|(_, until)| now < *until);
             let Some((figure, _)) = *begun else { continue };
             match fault {
@@ -59,6 +68,15 @@ impl NetworkFaults {
             }
         }
         quality
+    }
+
+    /// What is sent for a packet at `now`.
+    pub fn sent_for(&mut self, now: Time, mut packet: Packet) -> Packet {
+        self.displaced = self.displaced.filter(|(_, until)| now < *until);
+        if let Some((by, _)) = self.displaced {
+            packet.p.iter_mut().zip(by).for_each(|(p, by)| *p += by);
+        }
+        packet
     }
 }
 
@@ -79,7 +97,12 @@ mod tests {
         faults.begin(NetworkFault::Delay, 0.1, at(40));
         assert_eq!(faults.over(at(30), should), Quality { delay: 0.1, loss: 0.3, ..should });
         assert_eq!(faults.over(at(40), should), Quality { loss: 0.3, ..should });
+        let packet = Packet { p: [1.0, 2.0, 3.0], v: [0.1, 0.2, 0.3], seq: 7, aligned: true, ..Packet::default() };
+        faults.displace([0.5, 0.0, -1.0], at(50));
+        assert_eq!(faults.sent_for(at(49), packet), Packet { p: [1.5, 2.0, 2.0], ..packet });
+        assert_eq!(faults.sent_for(at(50), packet), packet);
+        faults.displace([0.5, 0.0, -1.0], Time::NEVER);
         faults.heal();
-        assert_eq!(faults.over(at(40), should), should);
+        assert_eq!((faults.over(at(40), should), faults.sent_for(at(40), packet)), (should, packet));
     }
 }
