@@ -6,6 +6,7 @@
 
 use super::alike::is_alike;
 use super::automaton::InterfaceAutomaton;
+use super::broken_exports::{BrokenExport, created_as};
 use super::neighbours::{Neighbours, ParentInterface, accepted};
 use super::report::{Accepted, Explored, Report};
 use super::settings;
@@ -72,6 +73,10 @@ where
     }
     let (mut report, shows) = one(Arc::new(view), &types, &around);
     report.findings.iter_mut().for_each(|finding| as_exported(finding, &whole.subsystems));
+    let broken = BrokenExport::all(whole.own_part(), catalogue);
+    if !broken.is_empty() {
+        report.drop_findings(|finding| broken.iter().any(|export| export.is_meant(finding)));
+    }
     for finding in simulated::faults(whole.own_part(), &whole, &Universe::new(&whole, catalogue)) {
         report.findings.push(finding);
         report.traces.push(Vec::new());
@@ -222,18 +227,6 @@ fn exported(
 
 fn own<T: Clone>((name, of): (&Ident, &T)) -> (Ident, T) {
     (*name, of.clone())
-}
-
-/// The type as which a file, or a subsystem of it, creates a component.
-fn created_as(
-    of: &Deployment,
-    component: ComponentName,
-    catalogue: &Catalogue,
-    path: Ident,
-) -> Option<Arc<ComponentType>> {
-    let changes = of.configurations.iter().flat_map(|configuration| &configuration.changes);
-    let ty = changes.filter_map(|change| change.kind.makes()).find(|(name, ..)| *name == component)?.1;
-    catalogue.get(ty).or_else(|| catalogue.get(ty.within(path))).cloned()
 }
 
 /// Any value of a type.

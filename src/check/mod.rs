@@ -15,6 +15,7 @@ mod bars;
 mod behind;
 mod belief;
 mod bound;
+mod broken_exports;
 mod children;
 mod chunks;
 mod closed;

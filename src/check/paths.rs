@@ -25,9 +25,16 @@ pub fn raised(deployment: &Deployment, name: EventName) -> Option<Finding> {
     let accepts: Vec<&str> = accepted(subsystem).map(|event| event.as_str()).collect();
     let list = accepts.iter().map(|event| format!("`{event}`")).collect::<Vec<_>>().join(", ");
     let by_itself = subsystem.own.safety.iter().any(|(event, _)| event.as_str() == own);
+    let is_configuration = subsystem.own.configurations.iter().any(|configuration| configuration.id.as_str() == own);
     let help = match nearest(own, accepts) {
         _ if by_itself => format!("`{own}` is an event of safety, which reaches `{path}` by itself; it accepts {list}"),
+        _ if is_configuration => format!(
+            "`{own}` is a configuration, which the coordinator of `{path}` asks for: raise an event that it waits for, and lists under `accepts`"
+        ),
         Some(near) => format!("did you mean `{path}/{near}`? `{path}` accepts {list}"),
+        None if own.contains('/') => {
+            format!("what is inside of `{path}` is led by its own coordinator: raise what that accepts, {list}")
+        }
         None => format!("`{path}` accepts {list}; list `{own}` under `accepts` in its file if it is to take it"),
     };
     Some(Finding::error(COORD_UNKNOWN_REQUEST, message).also(subsystem.origin, "the subsystem").help(help))

@@ -11,7 +11,7 @@ use super::seldom::RaisedForChild;
 use super::state::{Failed, ProductState, index};
 use crate::model::codes::{COMPOSE_PROMISE, COMPOSE_UNLEFT};
 use crate::model::subsystem::IGNORED;
-use crate::model::{Ask, ConfigId, EventName, Finding};
+use crate::model::{Ask, ConfigId, EventName, Finding, Ident, OperatorMay, Origin, Severity};
 use crate::statechart::{EventId, NodeId};
 use rustc_hash::FxHashMap;
 use std::collections::BTreeMap;
@@ -222,6 +222,11 @@ impl Graph<'_, '_> {
         for ((id, child), states) in all {
             let Some(at) = self.best_first(states).first().copied() else { continue };
             let of = &self.product.children[child];
+            let severity = severity_of(self.failed[at as usize]);
+            if let Some((member, _)) = id.sets() {
+                found.push((self.set_unpromised(severity, id, member, of.path), self.trace(at)));
+                continue;
+            }
             let message = match how[&(id, child)] {
                 true => format!("`{id}` is in force where `{}` need not be there any more, or not yet", of.path),
                 false => format!("`{id}` is asked for where what `{}` exports need not be there", of.path),
@@ -246,12 +251,23 @@ impl Graph<'_, '_> {
                 );
             }
             let place = self.product.worlds.configuration(id).map(|c| c.origin).unwrap_or_default();
-            let severity = severity_of(self.failed[at as usize]);
             let finding =
                 Finding::new(severity, COMPOSE_PROMISE, message).at(place).path(format!("configurations.{id}"));
             let trace = self.trace(at);
             found.push((finding.help(help), trace));
         }
+    }
+
+    /// An operator may set what a subsystem exports, and waits for nothing.
+    fn set_unpromised(&self, severity: Severity, id: ConfigId, member: &str, path: Ident) -> Finding {
+        let message =
+            format!("an operator may set `{member}` at any time, and what `{path}` exports need not be there");
+        let listed = self.product.deployment.operator.iter().find(|(may, _)| *may == OperatorMay::Apply(id));
+        let own = member.rsplit_once('/').map_or(member, |(_, own)| own);
+        let finding = Finding::new(severity, COMPOSE_PROMISE, message).at(listed.map_or(Origin::NONE, |(_, at)| *at));
+        finding.path("operator").help(format!(
+            "list it in the file of the subsystem that has it: `operator: [{own}]`; `davit set {member} …` is then its own configurator's to answer"
+        ))
     }
 
     /// What is to come down there waits for a subsystem in which an undo has failed: that one may be stranded.

@@ -2,7 +2,7 @@
 
 use super::trace::TraceStep;
 use super::verdict::CheckVerdict;
-use crate::model::{Deployment, Findings};
+use crate::model::{Deployment, Finding, Findings};
 use serde::Serialize;
 use std::ops::Deref;
 use std::sync::Arc;
@@ -76,4 +76,12 @@ pub struct Report {
     pub left: Vec<String>,
     /// What it comes to.
     pub verdict: CheckVerdict,
+}
+
+impl Report {
+    /// Leaves these findings out, with the ways to them.
+    pub(super) fn drop_findings(&mut self, of: impl Fn(&Finding) -> bool) {
+        let all = std::mem::take(&mut self.findings).into_iter().zip(std::mem::take(&mut self.traces));
+        (self.findings, self.traces) = all.filter(|(finding, _)| !of(finding)).unzip();
+    }
 }

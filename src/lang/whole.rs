@@ -25,6 +25,8 @@ struct GivenPart {
     /// What stands before the names of its parameters on the command line: `left.`.
     within: String,
     given: Vec<Entry>,
+    /// Which of that is given on, and where.
+    given_on: Vec<(String, Origin)>,
     at: Origin,
 }
 
@@ -53,8 +55,13 @@ pub fn deployment(cx: &mut Cx, from: &Sources, path: &Path, options: &LoadOption
         coordinators: 0,
         known,
     };
-    let part =
-        GivenPart { of: "the command line".to_owned(), within: String::new(), given: Vec::new(), at: Origin::NONE };
+    let part = GivenPart {
+        of: "the command line".to_owned(),
+        within: String::new(),
+        given: Vec::new(),
+        given_on: Vec::new(),
+        at: Origin::NONE,
+    };
     reader.deployment(cx, path, part, &options.set)
 }
 
@@ -109,7 +116,7 @@ impl DeploymentReader<'_> {
         }
         let mut with = draft.with;
         let at = if part.at.is_some() { part.at } else { origin };
-        let own = interface::given(cx, (declared, &draft.ill), given, (&part.of, &part.within), at);
+        let own = interface::given(cx, (declared, &draft.ill), (given, &part.given_on), (&part.of, &part.within), at);
         let handed = interface::hand_down(cx, &mut draft.subsystems, &own);
         let subsystems = self.subsystems(cx, &folder, draft.subsystems, (&part.within, set))?;
         for entry in own {
@@ -235,6 +242,7 @@ impl DeploymentReader<'_> {
                         of: format!("`{}`", draft.name),
                         within: format!("{within}{}.", draft.name),
                         given: draft.parameters,
+                        given_on: draft.given_on,
                         at: draft.named_at,
                     };
                     let deployment = self.deployment(cx, &folder.join(&draft.file), part, &own).map(Arc::new);

@@ -219,6 +219,18 @@ pub enum ValueError {
     },
 }
 
+impl ValueError {
+    /// What to do about it where a value of that type is wanted.
+    pub fn advice(&self, ty: &ValueType) -> String {
+        match self {
+            Self::Range { min: Some(min), max: Some(max), .. } => format!("give a value from {min} to {max}"),
+            Self::Range { min: Some(min), .. } => format!("give {min} or more"),
+            Self::Range { max, .. } => format!("give {} or less", max.unwrap_or(f64::INFINITY)),
+            Self::Fit(_) => format!("give a value of the type {ty}"),
+        }
+    }
+}
+
 fn outside(value: f64, min: Option<f64>, max: Option<f64>) -> String {
     match (min, max) {
         (Some(min), Some(max)) => format!("{value} is outside {min} … {max}"),

@@ -1,7 +1,7 @@
 //! What can be made to go wrong in a component, as the world would do it: declared by its type, or the same in every component
 //! whose code runs here.
 
-use super::component_type::{ComponentType, ValueError, fit_within};
+use super::component_type::{ComponentType, fit_within};
 use super::finding::did_you_mean;
 use super::names::Ident;
 use super::value::{Value, ValueType};
@@ -176,14 +176,7 @@ fn fit(name: &str, parameters: &[InjectionParameter], given: &[(String, Value)])
         match (value, &parameter.default) {
             (Some(value), _) => match fit_within(value, ty, parameter.min, parameter.max) {
                 Ok(value) => Ok(value),
-                Err(why) => {
-                    let help = match (&why, parameter.min, parameter.max) {
-                        (ValueError::Range { .. }, Some(min), Some(max)) => format!("give a value from {min} to {max}"),
-                        (ValueError::Range { .. }, ..) => "give a value within that".to_owned(),
-                        _ => format!("give a value of the type {ty}"),
-                    };
-                    no(format!("`{name_of}` of `{name}`: {why}"), help)
-                }
+                Err(why) => no(format!("`{name_of}` of `{name}`: {why}"), why.advice(ty)),
             },
             (None, Some(default)) => Ok(default.clone()),
             (None, None) => no(format!("`{name}` needs `{name_of}`"), format!("give it: {{ {name_of} = … }}, a {ty}")),

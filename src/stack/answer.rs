@@ -387,10 +387,16 @@ impl fmt::Display for Reason {
             Self::NeedsForce(id) => {
                 write!(f, "`{id}` is a frame of a coordinator: `--force` undoes it all the same (in a script `{{force = true}}`)")
             }
-            Self::NotListed(id) => write!(
-                f,
-                "the deployment's `operator:` does not list `{id}`: add it there, or say `--force` (in a script `{{force = true}}`)"
-            ),
+            Self::NotListed(id) => {
+                let (file, own) = match id.as_str().rsplit_once('/') {
+                    Some((path, own)) => (format!("`operator:` in the file of `{path}`"), own),
+                    None => ("the deployment's `operator:`".to_owned(), id.as_str()),
+                };
+                write!(
+                    f,
+                    "{file} does not list `{own}`: add it there, or say `--force` (in a script `{{force = true}}`)"
+                )
+            }
             Self::Broken(residual) => write!(f, "{residual}"),
             Self::StillBroken(residual) => write!(f, "what it names is broken since an earlier request: {residual}"),
             Self::NotConfirmed(event, within) => {

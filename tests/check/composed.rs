@@ -558,6 +558,24 @@ fn what_is_raised_for_a_subsystem_is_among_what_it_accepts_and_what_is_heard_of_
         assert_eq!(says, format!("`left/{wrong}` is nothing that `left` accepts"));
         assert_eq!(help, format!("did you mean `left/{near}`? {list}"));
     }
+    // What would be refused again, or ignored, is not advised.
+    let (_, help) = raised("run");
+    assert!(
+        help.starts_with("`run` is a configuration") && help.contains("raise an event that it waits for"),
+        "{help}"
+    );
+    let inside = [
+        ("pair.yaml", "left: { deployment: arm.yaml, parameters: { gain: 0.7 } }", "left: { deployment: mid.yaml }"),
+        ("pair.lua", "'left/e_start', 'right", "'left/inner/e_start', 'right"),
+    ];
+    let (_, help) = one(&inside, "coord::unknown_request");
+    assert!(help.contains("led by its own coordinator: raise what that accepts, `e_released`"), "{help}");
+    let (says, help) =
+        one(&[("pair.yaml", "coordinator: pair.lua", "operator: [left.k]\ncoordinator: pair.lua")], "compose::promise");
+    assert!(
+        says.starts_with("an operator may set `left/D.k` at any time") && help.contains("`operator: [D.k]`"),
+        "{says} {help}"
+    );
     let (_, help) = raised("fold");
     assert!(help.starts_with(list) && help.contains("`accepts`"), "{help}");
     let by_itself = [
@@ -713,6 +731,31 @@ fn accepted_by_no_product_refused(random: fn(u64) -> Vec<(&'static str, &'static
         }
     }
     assert!(accepted > 5 && refused > 5, "{accepted} accepted, {refused} refused");
+}
+
+/// An export that names nothing is told where it stands, and not again, in names that nobody wrote, wherever it is used or handed on.
+#[test]
+fn what_follows_from_a_broken_export_is_not_said() {
+    let handed_on =
+        ("pair.yaml", "left: { deployment: arm.yaml, parameters: { gain: 0.7 } }", "left: { deployment: mid.yaml }");
+    for (before, after, says) in [
+        ("pose: D.pose, ref", "pose: D.pos, ref", "D (Drive) has no port `pos`"),
+        ("properties: { k: D.k }", "properties: { k: D.kk }", "D (Drive) has no property `kk`"),
+        ("properties: { k: D.k }", "properties: { k: E.k }", "no configuration creates a component `E`"),
+    ] {
+        for changes in [&[("arm.yaml", before, after)][..], &[("arm.yaml", before, after), handed_on[0], handed_on[1]]]
+        {
+            let errors = found(changes).into_iter().filter(Finding::is_error);
+            let errors: Vec<String> = errors.map(|error| error.message).collect();
+            assert_eq!(errors, [says], "{changes:?}");
+        }
+    }
+    // What is wrong beside it is told all the same.
+    let errors = found(&[
+        ("arm.yaml", "pose: D.pose, ref", "pose: D.pos, ref"),
+        ("pair_conf.lua", "property_set('left.k', 2.0)", "property_set('left.kk', 2.0)"),
+    ]);
+    assert_eq!(errors.into_iter().filter(Finding::is_error).count(), 2);
 }
 
 #[test]

@@ -117,7 +117,9 @@ fn part(folder: &Path, chance: &mut Chance, path: &str, levels: u64) -> Part {
         ids.push(format!("{path}couple"));
         // What is exported is its own, or handed on.
         for (at, name) in ["out", "ref", "k"].into_iter().enumerate() {
-            if chance.below(2) == 0 {
+            // An in-port is driven once.
+            let is_free = name != "ref" || below.len() > 1;
+            if chance.below(2) == 0 && is_free {
                 exported[at] = (format!("{first}.{name}"), out[at].clone());
             }
         }

@@ -161,6 +161,10 @@ fn a_stack_keeps_its_numbers_and_says_what_holds() {
     let folded = cell.shows(&["stack", "--depth", "1"]);
     assert!(folded.starts_with("5 duo/join by duo at s\n") && folded.lines().count() == 3, "{folded}");
     assert!(folded.contains("duo/left 2 frames at s newest duo/left/run\n"), "{folded}");
+    // What nobody may set is listed in the file of the subsystem, by the name that it has there.
+    let refused = cell.0.run(&["set", "duo/left/Drive.gain", "0.3"]);
+    let said = "`operator:` in the file of `duo/left` does not list `Drive.gain`";
+    assert!(refused.code == 1 && refused.out.contains(said), "{}{}", refused.out, refused.err);
 
     let join = &whole[4];
     assert_eq!((&join["subsystem"], &join["touches"]), (&json!("duo"), &json!(["duo/left", "duo/right"])), "{join}");

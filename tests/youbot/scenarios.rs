@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Each with what is set for it here: what takes a minute in the file is shorter.
-const SCENARIOS: [(&str, &[(&str, &str)]); 35] = [
+const SCENARIOS: [(&str, &[(&str, &str)]); 36] = [
     ("beside", &[]),
     ("blocked", &[]),
     ("bring_up", &[]),
@@ -40,6 +40,7 @@ const SCENARIOS: [(&str, &[(&str, &str)]); 35] = [
     ("saturated", &[]),
     ("shutdown_while_copying", &[]),
     ("through_the_world", &[]),
+    ("torques", &[]),
     ("tracking", &[("seconds", "20")]),
     ("tuned", &[]),
     ("udp", &[]),
@@ -160,6 +161,12 @@ fn estop() {
     run("estop");
 }
 
+/// The same places, by an error of the drives.
+#[test]
+fn a_drive_s_error_stops_it_wherever_an_emergency_stop_does() {
+    script(&folder().join("estop.lua"), &[("by", "overcurrent")]);
+}
+
 #[test]
 fn hang() {
     run("hang");
@@ -258,6 +265,11 @@ fn shutdown_while_copying() {
 #[test]
 fn through_the_world() {
     run("through_the_world");
+}
+
+#[test]
+fn torques() {
+    run("torques");
 }
 
 #[test]

@@ -5,6 +5,7 @@ use super::{by_name, entries, name, text, value};
 use crate::lang::bound;
 use crate::lang::grammar::{EXPORTS, LEAVING, PARAMETER, SUBSYSTEM};
 use crate::lang::tree::{Cx, Entry, Fields, Kind, Node};
+use crate::model::finding::nearest;
 use crate::model::{
     EventName, Export, Finding, Ident, Interface, LeavingRule, MemberClass, MemberRef, Origin, PropertyType, Tunable,
     ValueType, codes,
@@ -21,6 +22,8 @@ pub struct SubsystemDraft {
     pub named_at: Origin,
     /// What it is given.
     pub parameters: Vec<Entry>,
+    /// Which of that are parameters of this file that it gives on, and where.
+    pub given_on: Vec<(String, Origin)>,
     /// Its activities that are those of this file.
     pub activities: Vec<(Ident, Ident, Origin)>,
     /// Where it is named.
@@ -131,15 +134,17 @@ fn subsystem(cx: &mut Cx, own: Ident, entry: Entry) -> Option<SubsystemDraft> {
         }
     }
     fields.finish(cx);
-    Some(SubsystemDraft { name: own, file: file?, named_at, parameters, activities, origin: entry.origin })
+    let given_on = Vec::new();
+    Some(SubsystemDraft { name: own, file: file?, named_at, parameters, given_on, activities, origin: entry.origin })
 }
 
 /// Values of parameters as the Lua files read them: those that are given, and the defaults of the others (of an `ill` one, which is not
-/// declared in order, nothing is known). For messages: who gives them (`of`), and what stands before their names on the command line.
+/// declared in order, nothing is known). For messages: who gives them (`of`), what stands before their names on the command line, and where
+/// something is given on.
 pub fn given(
     cx: &mut Cx,
     (declared, ill): (&BTreeMap<Ident, PropertyType>, &[Ident]),
-    mut given: Vec<Entry>,
+    (mut given, given_on): (Vec<Entry>, &[(String, Origin)]),
     (of, within): (&str, &str),
     at: Origin,
 ) -> Vec<Entry> {
@@ -183,8 +188,10 @@ pub fn given(
                 } else {
                     ""
                 };
-                let help = format!("give a value that it allows: {}{quotes}", parameter.ty);
-                cx.report(finding.at(place).also(parameter.origin, "declared here").help(help));
+                let help = format!("{}{quotes}", error.advice(&parameter.ty));
+                let finding = finding.at(place).also(parameter.origin, "declared here").help(help);
+                let here = given_on.iter().find(|(given_on, _)| *given_on == name.as_str());
+                cx.report(here.into_iter().fold(finding, |finding, (_, at)| finding.also(*at, "given on here")));
                 values.push(lost(*name, place));
             }
         }
@@ -202,25 +209,36 @@ pub fn given(
 /// names of those that some subsystem is given.
 pub fn hand_down(cx: &mut Cx, subsystems: &mut [SubsystemDraft], own: &[Entry]) -> Vec<String> {
     let mut handed = Vec::new();
-    for entry in subsystems.iter_mut().flat_map(|subsystem| &mut subsystem.parameters) {
-        let of = match &entry.value.kind {
-            Kind::Map(of) if of.len() == 1 && of[0].key == "parameter" => &of[0].value,
-            _ => continue,
-        };
-        let Kind::Str(name) = &of.kind else { continue };
-        let (name, at) = (name.to_string(), of.origin);
-        if let Some(known) = own.iter().find(|known| known.key == name.as_str()) {
-            entry.value = Node { origin: at, ..known.value.clone() };
-            handed.push(name);
-        } else {
-            let known = own.iter().map(|known| &*known.key);
-            let help = match own {
-                [] => format!("declare it in this file: `parameters: {{ {name}: {{ type: float }} }}`"),
-                _ => crate::model::finding::did_you_mean(&name, "parameters of this file", known),
-            };
-            let finding = Finding::error(codes::COMPOSE_PARAMETER, format!("this file has no parameter `{name}`"));
-            cx.report(finding.at(at).labelled("to be given on").help(help));
-            entry.value = Node::new(Kind::Poison, at);
+    for SubsystemDraft { parameters, given_on, .. } in subsystems {
+        for entry in parameters {
+            let Kind::Map(of) = &entry.value.kind else { continue };
+            let [only] = &of[..] else { continue };
+            let Kind::Str(name) = &only.value.kind else { continue };
+            let (name, at) = (name.to_string(), only.value.origin);
+            if only.key != "parameter" {
+                if nearest(&only.key, ["parameter"]).is_some() {
+                    let message = format!("`{}: {name}` gives nothing on", only.key);
+                    let finding = Finding::error(codes::COMPOSE_PARAMETER, message).at(only.origin);
+                    cx.report(finding.help(format!("did you mean `parameter: {name}`?")));
+                    entry.value = Node::new(Kind::Poison, at);
+                }
+                continue;
+            }
+            if let Some(known) = own.iter().find(|known| known.key == name.as_str()) {
+                // Where it was given to this file: what is wrong with it is mended there.
+                entry.value = known.value.clone();
+                given_on.push((entry.key.to_string(), at));
+                handed.push(name);
+            } else {
+                let known = own.iter().map(|known| &*known.key);
+                let help = match own {
+                    [] => format!("declare it in this file: `parameters: {{ {name}: {{ type: float }} }}`"),
+                    _ => crate::model::finding::did_you_mean(&name, "parameters of this file", known),
+                };
+                let finding = Finding::error(codes::COMPOSE_PARAMETER, format!("this file has no parameter `{name}`"));
+                cx.report(finding.at(at).labelled("to be given on").help(help));
+                entry.value = Node::new(Kind::Poison, at);
+            }
         }
     }
     handed
