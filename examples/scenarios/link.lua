@@ -29,7 +29,7 @@ end
 local SWAY = "sway 600 0.042 0.042 0 0.15"
 local function hand(script) set("left/Operator.script", script, { force = true, within = 1 }) end
 local function forces(name)
-  local signals = { base_x = "left/youbot.odometry.x", base_y = "left/youbot.odometry.y" }
+  local signals = { base_x = "left/youbot.odometry.x", base_y = "left/youbot.odometry.y", left_up = "World.robot1_tool_pose.p[2]", right_up = "World.robot2_tool_pose.p[2]" }
   for _, robot in ipairs{ "left", "right" } do
     for i, axis in ipairs{ "x", "y", "z" } do
       signals[robot .. "_" .. axis] = robot .. "/Cart_Impedance.f_des[" .. i - 1 .. "]"
@@ -39,40 +39,58 @@ local function forces(name)
 end
 
 until_both("eight_DOF_mode", 20)
-hand(SWAY)
-both("e_5dof")
-until_both("five_DOF_mode", 0.01)
-wait(5)
+set("right/Operator.script", "free 600", { force = true, within = 1 })
 
--- Cut, for 2 s. Which of the two robots is told first is not said; each lets go by itself.
-local s, at = forces("cut"), nets("cut", { seconds = 2 })
-wait_answer("left/e_link_lost", 0.5)
-local lost = now()
-wait_state("left:unsync", 0.01)
-wait_answer("left/disable_copying.ok", 0.01)
-local disabled = now()
-until_both("unsync", 0.1)
-wait(at + 2 - now())
-expect{ name = "cut: e_link_lost after", value = lost - at, max = 0.12, unit = "s" }
-expect{ name = "cut: disable_copying behind it", value = disabled - lost, max = 0.005, unit = "s" }
-expect{ name = "cut: force after 0.16 s", value = math.max(after(s, "left", at + 0.16), after(s, "right", at + 0.16)), max = 0.1, unit = "N" }
-hand("align 8; free 600")
-local healed = at + 2
-expect{ name = "healed: harmonizing after", value = until_both("harmonizing", 3) - healed, min = 1.0, max = 1.2, unit = "s" }
-until_both("five_DOF_mode", 20)
-hand(SWAY)
-wait(3)
-until_both("five_DOF_mode", 0)
-s:stop()
-expect{ name = "healed: the base went, with five", unit = "m", max = 0.002,
-        value = math.max(s:max("base_x") - s:min("base_x"), s:max("base_y") - s:min("base_y")) }
+-- Cut, for 2 s, with five degrees of freedom and with eight; then the hand holds the tools apart. Which of the two robots is told first is not
+-- said; each lets go by itself, and its arm stays up.
+for _, mode in ipairs{ "five", "eight" } do
+  both(mode == "five" and "e_5dof" or "e_8dof")
+  until_both(mode .. "_DOF_mode", 0.01)
+  hand(SWAY)
+  wait(3)
+  local s, at = forces(mode .. "_cut"), nets("cut", { seconds = 2 })
+  wait_state("left:unsync", 0.5)
+  wait_state("right:unsync", 0.5)
+  local lost, disabled = 0, 0
+  for _, it in ipairs(log{ since = at }) do
+    if it.what == "event" and it.event:find("e_link_lost") then lost = math.max(lost, it.at) end
+  end
+  for _, robot in ipairs{ "left", "right" } do wait_answer(robot .. "/disable_copying.ok", 0.01) end
+  disabled = now()
+  hand("hold 600")
+  wait(at + 2 - now())
+  expect{ name = mode .. ", cut: e_link_lost after", value = lost - at, max = 0.12, unit = "s" }
+  expect{ name = mode .. ", cut: disable_copying behind it", value = disabled - lost, max = 0.005, unit = "s" }
+  expect{ name = mode .. ", cut: force after 0.16 s", value = math.max(after(s, "left", at + 0.16), after(s, "right", at + 0.16)), max = 0.1, unit = "N" }
+  -- Healed, and the left tool is 10 cm away: nothing couples before somebody has brought them together.
+  hand("go 1 0 0 0.1; hold 600")
+  local healed = at + 2
+  expect{ name = mode .. ", healed: harmonizing after", value = until_both("harmonizing", 3) - healed, min = 1.0, max = 1.2, unit = "s" }
+  wait(3)
+  until_both("harmonizing", 0)
+  s:stop()
+  expect{ name = mode .. ", healed and apart: force", value = math.max(after(s, "left", at + 0.16), after(s, "right", at + 0.16)), max = 0.1, unit = "N" }
+  expect{ name = mode .. ", without a link: the right arm came down by", value = 1000 * (s:max("right_up") - s:last("right_up")), max = 2, unit = "mm" }
+  local s = forces(mode .. "_healed")
+  hand("align 8; free 600")
+  until_both(mode .. "_DOF_mode", 20)
+  hand(SWAY)
+  wait(3)
+  until_both(mode .. "_DOF_mode", 0)
+  s:stop()
+  if mode == "five" then
+    expect{ name = "healed: the base went, with five", unit = "m", max = 0.002,
+            value = math.max(s:max("base_x") - s:min("base_x"), s:max("base_y") - s:min("base_y")) }
+  end
+end
 
--- 50 ms one way: eight degrees of freedom are left, and nobody takes them again but an operator.
+-- From 2 ms one way to 50: eight degrees of freedom are left, and nobody takes them again but an operator.
 both("e_8dof")
 until_both("eight_DOF_mode", 0.01)
+nets("delay", { delay = 0.002 })
 wait(3)
 local s, at = sample{ every = 0.001, name = "slow", signals = { "left/Cart_Impedance.active", "right/Cart_Impedance.active" } }, nets("delay", { delay = 0.05 })
-wait_answer("left/e_qos_degraded", 0.5)
+for _, robot in ipairs{ "left", "right" } do wait_answer(robot .. "/e_qos_degraded", 0.5) end
 expect{ name = "50 ms: e_qos_degraded after", value = now() - at, max = 0.1, unit = "s" }
 until_both("five_DOF_mode", 0.1)
 both("e_8dof")
@@ -91,11 +109,33 @@ both("e_8dof")
 until_both("eight_DOF_mode", 0.01)
 wait(2)
 
--- A third of the packets lost: the same.
+-- 30 % of the packets lost, and up to 10 ms of jitter: the same, and they go on copying. 300 N/m.
+for _, robot in ipairs{ "left", "right" } do
+  apply(robot .. "/profile_stiff", { force = true })
+  wait_answer(robot .. "/profile_stiff.ok", 1)
+end
+hand("sway 600 0.06 0 0 0.15")
+wait(4)
+local signals = { left = "left/Cart_Impedance.active", right = "right/Cart_Impedance.active" }
+for robot = 1, 2 do
+  for i = 0, 2 do signals["p" .. robot .. i] = "World.robot" .. robot .. "_tool_pose.p[" .. i .. "]" end
+end
+local s = sample{ every = 0.001, name = "lossy", signals = signals }
 nets("loss", { loss = 0.3 })
+nets("jitter", { jitter = 0.01 })
 until_both("five_DOF_mode.degraded", 2)
+wait(20)
+until_both("five_DOF_mode.degraded", 0)
+s:stop()
+local squares, v = 0, {}
+for name in pairs(signals) do v[name] = s:values(name) end
+for i = 1, #v.p10 do squares = squares + (v.p10[i] - v.p20[i])^2 + (v.p11[i] - v.p21[i])^2 + (v.p12[i] - v.p22[i])^2 end
+expect{ name = "30 % lost: copying", value = 100 * math.min(s:mean("left"), s:mean("right")), min = 100, unit = "%" }
+expect{ name = "30 % lost: tools apart, RMS", value = 1000 * math.sqrt(squares / #v.p10), max = 12, unit = "mm" }
 heal()
 until_both("five_DOF_mode.free", 5)
+for _, robot in ipairs{ "left", "right" } do undo(robot .. "/profile_stiff") end
+hand("align 8; free 600")
 both("e_8dof")
 until_both("eight_DOF_mode", 0.01)
 wait(2)

@@ -736,8 +736,10 @@ fn accepted_by_no_product_refused(random: fn(u64) -> Vec<(&'static str, &'static
 /// An export that names nothing is told where it stands, and not again, in names that nobody wrote, wherever it is used or handed on.
 #[test]
 fn what_follows_from_a_broken_export_is_not_said() {
-    let handed_on =
-        ("pair.yaml", "left: { deployment: arm.yaml, parameters: { gain: 0.7 } }", "left: { deployment: mid.yaml }");
+    let handed_on = [
+        ("pair.yaml", "left: { deployment: arm.yaml, parameters: { gain: 0.7 } }", "left: { deployment: mid.yaml }"),
+        ("pair.yaml", "right: { deployment: arm.yaml }", "right: { deployment: mid.yaml }"),
+    ];
     for (before, after, says) in [
         ("pose: D.pose, ref", "pose: D.pos, ref", "D (Drive) has no port `pos`"),
         ("properties: { k: D.k }", "properties: { k: D.kk }", "D (Drive) has no property `kk`"),
