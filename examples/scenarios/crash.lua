@@ -11,19 +11,22 @@ local DEAD = {
   { "Monitors",       "e_watch_lost" },
 }
 
+deploy("../../deployments/youbot_coupling.yaml")
 for _, dead in ipairs(DEAD) do
   local component, event = table.unpack(dead)
-  deploy("../../deployments/youbot_coupling.yaml")
+  raise("e_start")     -- again, but for the first
   wait_state("left:copying", 20)
   wait_state("right:copying", 20)
   set("left/Operator.script", "sway 600 0.042 0.042 0 0.15", { force = true, within = 1 })
   wait(2)
   wait_state("left:copying", 0)
-  local s = sample{ every = 0.001, name = component, signals = {
-    x = "World.robot1_tool_twist.v[0]", y = "World.robot1_tool_twist.v[1]", z = "World.robot1_tool_twist.v[2]" } }
+  local signals = { x = "World.robot1_tool_twist.v[0]", y = "World.robot1_tool_twist.v[1]", z = "World.robot1_tool_twist.v[2]" }
+  for joint = 0, 4 do signals["t" .. joint] = "left/youbot.jointstate.eff[" .. joint .. "]" end
+  local s = sample{ every = 0.001, name = component, signals = signals }
   local at = now() + 0.01
   inject("left/" .. component, "panic", {}, at)
   wait_answer("left/" .. event, 1)
+  assert_state("left/" .. component, "faulted")
   expect{ name = component .. ": noticed after", value = 1000 * (now() - at), max = 50, unit = "ms" }
   wait_state("left:fault", 0.01)
   wait_answer("left/safe_hold.ok", 0.1)
@@ -32,6 +35,7 @@ for _, dead in ipairs(DEAD) do
     wait_state("left:operational", 1)
     set("left/Operator.script", "align 8; free 600", { force = true, within = 1 })
     wait_state("left:harmonizing", 1)
+    assert_running("left/" .. component)
     expect{ name = component .. ": harmonizing after", value = 1000 * (now() - at), max = 1000, unit = "ms" }
     wait_state("left:copying", 10)
   else
@@ -39,11 +43,20 @@ for _, dead in ipairs(DEAD) do
     wait_state("right:harmonizing", 1)
     expect{ name = component .. ": the other lets go after", value = 1000 * (now() - at), max = 500, unit = "ms" }
     wait(at + 1 - now())
-    s:stop()
     local x, y, z, rest = s:values("x"), s:values("y"), s:values("z"), 0
     for i, t in ipairs(s:times()) do if t >= at + 0.35 then rest = math.max(rest, math.sqrt(x[i]^2 + y[i]^2 + z[i]^2)) end end
     expect{ name = component .. ": 0.35 s later the tool moves with", value = rest, max = 0.02, unit = "m/s" }
     wait_state("left:fault", 0)
   end
-  shutdown()
+  s:stop()
+  -- A force that is not told any more fades, and does not go on.
+  local step = 0
+  for joint = 0, 4 do
+    local t = s:values("t" .. joint)
+    for i = 2, #t do step = math.max(step, math.abs(t[i] - t[i - 1])) end
+  end
+  expect{ name = component .. ": torque in 1 ms", value = step, max = 0.5, unit = "N m" }
+  raise("e_shutdown")
+  wait_state("pair:idle", 20)
+  assert(#stack() == 0, "something is left")
 end

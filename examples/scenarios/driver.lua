@@ -12,7 +12,7 @@ local OF_A_MOTOR = { overcurrent = true, overtemp = true, hall = true, sine_comm
 
 deploy("../../deployments/youbot_coupling.yaml")
 
-local worst = { heard = 0, left = 0, rest = 0, elsewhere = 0 }
+local worst = { heard = 0, left = 0, rest = 0, elsewhere = 0, kept = 0 }
 for _, fault in ipairs(FAULTS) do
   wait_state("left:copying", 20)
   wait_state("right:copying", 20)
@@ -41,6 +41,9 @@ for _, fault in ipairs(FAULTS) do
   wait_state("left:operational", 0.1)
   wait_state("left:five_DOF_mode", 20)
   wait(0.5)
+  for _, flags in ipairs(signal("left/youbot.motor_states.joint_error_flags")) do
+    if flags ~= 0 then worst.kept = worst.kept + 1 end
+  end
   raise("left/e_8dof")
   wait_state("left:eight_DOF_mode", 0.1)
   s:stop()
@@ -55,3 +58,4 @@ expect{ name = "the fault is heard after", value = worst.heard, max = 0.005, uni
 expect{ name = "the other robot has let go after", value = worst.left, max = 0.5, unit = "s" }
 expect{ name = "0.3 s later the tool moves with", value = worst.rest, max = 0.02, unit = "m/s" }
 expect{ name = "error flags at another joint, or missing", value = worst.elsewhere, max = 0 }
+expect{ name = "error flags that a reset has not cleared", value = worst.kept, max = 0 }

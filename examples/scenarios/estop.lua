@@ -71,7 +71,7 @@ local function measured(s, since)
   return fastest, step, way
 end
 
-local worst = { heard = 0, behind = 0, speed = 0, step = 0, way = 0 }
+local worst = { taking = 0, heard = 0, behind = 0, speed = 0, step = 0, way = 0 }
 for number, place in ipairs(PLACES) do
   local name, go = table.unpack(place)
   go_down()
@@ -102,12 +102,16 @@ for number, place in ipairs(PLACES) do
   figure{ name = name .. ": fastest", value = before, unit = "m/s" }
   expect{ name = name .. ": 0.3 s later", value = after, max = 0.02, unit = "m/s" }
   if place.state then worst.behind, heard = math.max(worst.behind, heard), 0 end
-  worst = { heard = math.max(worst.heard, heard), behind = worst.behind, speed = math.max(worst.speed, before), step = math.max(worst.step, step), way = math.max(worst.way, way) }
+  worst = { taking = worst.taking, heard = math.max(worst.heard, heard), behind = worst.behind, speed = math.max(worst.speed, before), step = math.max(worst.step, step), way = math.max(worst.way, way) }
+  for _, robot in ipairs(STOPPED) do
+    if signal(robot .. "/youbot.control_mode") == 6 then worst.taking = worst.taking + 1 end
+  end
   both("e_reset")
   wait(0.5)
 end
 expect{ name = "braking begins within", value = worst.heard, max = 0.001, unit = "s" }
 expect{ name = "where a call of the drives, or the base, is out for 30 ms: within", value = worst.behind, max = 0.03, unit = "s" }
 expect{ name = "from 0.3 s on until it is reset the tool goes", value = 1000 * worst.way, max = 2, unit = "mm" }
+expect{ name = "stopped, and takes torques", value = worst.taking, max = 0 }
 expect{ name = "it was in motion, at most", value = worst.speed, min = 0.1, unit = "m/s" }
 expect{ name = "torque in 1 ms", value = worst.step, max = 0.5, unit = "N m" }

@@ -18,6 +18,10 @@ for _, how in ipairs{ "fail", "lost" } do
   local at = now()
   raise("e_aligned")
   wait_answer("enable_copying.failed", 2)
+  local failed
+  for _, it in ipairs(log{ since = at }) do if it.answer == "enable_copying.failed" then failed = it end end
+  local reasons = table.concat(failed.reasons, "; ")
+  assert(reasons:find("port_write Cart_Impedance.ext_ref_mode = true", 1, true), "it is not told which step failed: " .. reasons)
   wait_state("harmonizing", 0.01)
   wait_answer("five_DOF.ok", 0.01)
   expect{ name = how .. ": harmonizing again after", value = 1000 * (now() - at), max = longest, unit = "ms" }

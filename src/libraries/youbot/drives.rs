@@ -215,7 +215,7 @@ impl Drives {
         !matches!(self.task, DriveTask::Idle)
     }
 
-    /// Changes what they do.
+    /// Changes what they do; who brakes takes torques when that is taken back, and not before.
     ///
     /// # Errors
     /// In words: while a motion is under way, or torque control before calibration.
@@ -225,6 +225,10 @@ impl Drives {
         }
         if mode == DriveMode::Torque && !self.calibrated {
             return Err("not calibrated");
+        }
+        if mode == DriveMode::Torque && self.braked {
+            self.resumes = true;
+            return Ok(());
         }
         if mode != self.mode {
             match mode {

@@ -454,3 +454,23 @@ fn the_speed_limit_may_be_switched_off() {
     assert!(limited < SPEED_LIMIT && limited > 1.2, "{limited} rad/s");
     assert!(free > 1.5 * SPEED_LIMIT, "{free} rad/s");
 }
+
+/// What asks for torques while they brake, as the way back of something that was stopped does, has them when that is taken back.
+#[test]
+fn who_brakes_takes_no_torques_before_that_is_taken_back() {
+    let mut drives = Drives::new(radians(WORKING_POSE_DEG));
+    drives.calibrated = true;
+    for holds in [false, true] {
+        drives.set_mode(if holds { DriveMode::Positioning } else { DriveMode::Torque }).unwrap();
+        drives.brake();
+        drives.set_mode(DriveMode::Torque).unwrap();
+        assert_eq!(drives.mode(), DriveMode::Positioning);
+        drives.release();
+        assert_eq!(drives.mode(), DriveMode::Torque);
+        drives.brake();
+        drives.set_mode(DriveMode::Torque).unwrap();
+        drives.set_mode(DriveMode::Positioning).unwrap();
+        drives.release();
+        assert_eq!(drives.mode(), DriveMode::Positioning, "the last word counts");
+    }
+}

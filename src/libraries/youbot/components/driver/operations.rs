@@ -23,7 +23,8 @@ impl Driver {
     /// The operations, and the faults that a script may inject.
     pub(super) fn offer_operations(b: &mut Builder<Self>) {
         b.doc(
-            "Changes what the drives do: 0 off (done when their torque has faded), 1 hold a position, 6 take torques.",
+            "Changes what the drives do: 0 off (done when their torque has faded), 1 hold a position, 6 take torques (while they brake: \
+             when they are released).",
         )
         .operation(
             "setControlMode",
