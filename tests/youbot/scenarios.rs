@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Each with what is set for it here: what takes a minute in the file is shorter.
-const SCENARIOS: [(&str, &[(&str, &str)]); 36] = [
+const SCENARIOS: [(&str, &[(&str, &str)]); 38] = [
     ("beside", &[]),
     ("blocked", &[]),
     ("bring_up", &[]),
@@ -35,10 +35,12 @@ const SCENARIOS: [(&str, &[(&str, &str)]); 36] = [
     ("peer_restart", &[]),
     ("pressed", &[]),
     ("push", &[]),
+    ("push_on", &[]),
     ("refused", &[]),
     ("repair", &[]),
     ("saturated", &[]),
     ("shutdown_while_copying", &[]),
+    ("soft_limit", &[]),
     ("through_the_world", &[]),
     ("torques", &[]),
     ("tracking", &[("seconds", "20")]),
@@ -243,6 +245,11 @@ fn push() {
 }
 
 #[test]
+fn push_on() {
+    run("push_on");
+}
+
+#[test]
 fn refused() {
     run("refused");
 }
@@ -260,6 +267,11 @@ fn saturated() {
 #[test]
 fn shutdown_while_copying() {
     run("shutdown_while_copying");
+}
+
+#[test]
+fn soft_limit() {
+    run("soft_limit");
 }
 
 #[test]

@@ -17,6 +17,7 @@ pub struct Operator {
     hand_k: Prop<f64>,
     hand_b: Prop<f64>,
     f_max: Prop<f64>,
+    insists: Prop<bool>,
     hand: Hand,
 }
 
@@ -51,6 +52,7 @@ impl Component for Operator {
             hand_k: b.doc("Stiffness of the hand.").unit("N/m").range(0.0..=2000.0).property("hand_k", 300.0),
             hand_b: b.doc("Damping of the hand.").unit("N s/m").range(0.0..=200.0).property("hand_b", 30.0),
             f_max: b.doc("Strength of the hand.").unit("N").range(0.0..=200.0).property("f_max", 30.0),
+            insists: b.doc("It does not let go of an arm that its drives hold, or move, by themselves.").property("insists", false),
             hand: Hand::new(HandScript::default()),
         }
     }
@@ -65,7 +67,8 @@ impl Component for Operator {
         self.hand.stiffness = self.hand_k.get();
         self.hand.damping = self.hand_b.get();
         self.hand.f_max = self.f_max.get();
-        if self.control_mode.get().is_some_and(|mode| mode != 6) {
+        let by_itself = self.control_mode.get().is_some_and(|mode| mode != 6);
+        if by_itself && !self.insists.get() {
             return self.ext_force.write(Vector3::zeros());
         }
         let other = self.ext_ref.get().map(|r| Vector3::from(r.p));
