@@ -82,7 +82,7 @@ fn tell_waiting(out: Output, name: String, done: Arc<AtomicBool>) {
             let (label, what) = match stopping.stands_still() {
                 Some(still) => ("waits for", still),
                 None if stopping.waits_for.is_empty() => {
-                    ("stopping ", format!("{} in {}", stopping.stage.words(), place(&status)))
+                    ("stopping ", format!("{} {}", stopping.stage.words(), places(&status)))
                 }
                 None => ("waits for", stopping.waits_for.join(", ")),
             };
@@ -99,7 +99,29 @@ fn tell_waiting(out: Output, name: String, done: Arc<AtomicBool>) {
     let _ = std::thread::Builder::new().name("davit-waits".to_owned()).spawn(tell);
 }
 
-/// The innermost active state.
-fn place(status: &Json) -> &str {
-    status["coordinator"].as_array().and_then(|states| states.last()).map_or("no state", text)
+/// Of each coordinator its innermost active state, by name where there are several.
+fn places(status: &Json) -> String {
+    let innermost =
+        |states: &Json| states.as_array().and_then(|states| states.last()).map_or("no state", text).to_owned();
+    match status["coordinators"].as_object().filter(|all| all.len() > 1) {
+        Some(all) => {
+            let each: Vec<String> =
+                all.iter().map(|(name, states)| format!("{name} in {}", innermost(states))).collect();
+            each.join(", ")
+        }
+        None => format!("in {}", innermost(&status["coordinator"])),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_coordinator_is_told_where_it_is() {
+        let alone = json!({ "coordinator": ["root", "root.left"], "coordinators": { "heat": ["root", "root.left"] } });
+        assert_eq!(places(&alone), "in root.left");
+        let both = json!({ "coordinator": ["root"], "coordinators": { "heat": ["root", "root.left"], "liquid": [] } });
+        assert_eq!(places(&both), "heat in root.left, liquid in no state");
+    }
 }

@@ -52,7 +52,9 @@ impl Component for Operator {
             hand_k: b.doc("Stiffness of the hand.").unit("N/m").range(0.0..=2000.0).property("hand_k", 300.0),
             hand_b: b.doc("Damping of the hand.").unit("N s/m").range(0.0..=200.0).property("hand_b", 30.0),
             f_max: b.doc("Strength of the hand.").unit("N").range(0.0..=200.0).property("f_max", 30.0),
-            insists: b.doc("It does not let go of an arm that its drives hold, or move, by themselves.").property("insists", false),
+            insists: b
+                .doc("It does not let go of an arm that its drives hold, or move, by themselves.")
+                .property("insists", false),
             hand: Hand::new(HandScript::default()),
         }
     }
