@@ -132,11 +132,7 @@ fn hash_frame(frame: &Frame, hasher: &mut impl Hasher) {
 
 /// Whether two frames differ in nothing but their number, age and memory.
 fn same_frame(a: &Frame, b: &Frame) -> bool {
-    (a.configuration, a.group, a.requester, a.scope) == (b.configuration, b.group, b.requester, b.scope)
-        && (a.left, a.partial, a.safe, &a.floor) == (b.left, b.partial, b.safe, &b.floor)
-        && a.parts == b.parts
-        && a.saved == b.saved
-        && a.owes == b.owes
+    a.is_like(b)
         && same_inverse(&a.inverse, &b.inverse)
         && (Arc::ptr_eq(&a.footprint, &b.footprint) || a.footprint == b.footprint)
 }

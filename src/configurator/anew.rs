@@ -23,9 +23,7 @@ impl Engine {
     pub(super) fn survive(&mut self, text: &str) {
         self.panics += 1;
         let _ = catch_unwind(AssertUnwindSafe(|| {
-            if let Some(progress) = &self.given.progress {
-                progress(&Progress::Survived(text.to_owned()));
-            }
+            self.given.tells(|| Progress::Survived(text.to_owned()));
         }));
         let reason = Reason::Panic(text.to_owned());
         let again = self.panics > limits::PANICS_IN_A_ROW;

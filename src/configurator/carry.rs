@@ -1,6 +1,6 @@
 //! A transaction between its machine and the platform: calls that are out, awaited and given up.
 
-use super::engine::Engine;
+use super::engine::{Engine, Given};
 use super::hands::Hands;
 use super::inbox::PoolReply;
 use super::pool::{CallFor, PlatformCall};
@@ -295,20 +295,25 @@ impl Engine {
     }
 
     fn tell_started(&self, step: &Step) {
-        if let Some(progress) = &self.given.progress {
-            progress(&Progress::Started(StepName::of(step)));
-        }
+        self.given.tells(|| Progress::Started(StepName::of(step)));
     }
 
     fn tell(&self, running: &Running, number: u32, end: StepEnd, took: Option<std::time::Duration>) {
-        if let Some(progress) = &self.given.progress {
-            progress(&Progress::Ended {
-                request: running.serves(number),
-                step: StepName::of(&running.machine.step(number).step),
-                end,
-                took,
-                undoing: running.machine.is_going_back(),
-            });
+        self.given.tells(|| Progress::Ended {
+            request: running.serves(number),
+            step: StepName::of(&running.machine.step(number).step),
+            end,
+            took,
+            undoing: running.machine.is_going_back(),
+        });
+    }
+}
+
+impl Given {
+    /// Tells whoever listens; what is told is made up only where somebody does.
+    pub(super) fn tells(&self, progress: impl FnOnce() -> Progress) {
+        if let Some(listens) = &self.progress {
+            listens(&progress());
         }
     }
 }

@@ -51,9 +51,7 @@ impl Engine {
                 self.counts.leads(path, false);
                 self.forget_confirmations();
                 self.changed();
-                if let Some(progress) = &self.given.progress {
-                    progress(&Progress::Emptied(path));
-                }
+                self.given.tells(|| Progress::Emptied(path));
             }
         }
     }

@@ -473,10 +473,8 @@ impl Engine {
             return;
         }
         let broken = self.broken_longest().is_some();
-        if std::mem::replace(&mut self.told_broken, broken) != broken
-            && let Some(progress) = &self.given.progress
-        {
-            progress(&Progress::Broken(broken));
+        if std::mem::replace(&mut self.told_broken, broken) != broken {
+            self.given.tells(|| Progress::Broken(broken));
         }
     }
 

@@ -155,9 +155,7 @@ impl Engine {
         let deadline = *at + self.given.limits.step_timeout;
         while let Some(ResolvedStep { step, place, index, value }) = fast.switch.step(*sent as usize, undoing) {
             let name = StepName::of(step);
-            if let Some(progress) = &self.given.progress {
-                progress(&Progress::Started(name));
-            }
+            self.given.tells(|| Progress::Started(name));
             // What is written was planned for this very component; only what an undo writes is not known to be allowed.
             let known = !undoing || matches!(step, Step::State { .. });
             let allowed = known && place.allows(step, &self.world.system);

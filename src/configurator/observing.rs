@@ -180,21 +180,11 @@ impl Engine {
         let cause = Reason::SeenOtherwise(steps.clone());
         let residual = Arc::new(Residual { difference: steps, ..Residual::of(cause.clone()) });
         let culprit = losers.first().map(|frame| (frame.configuration, frame.requester));
-        self.world.is_otherwise(Broken {
-            residual: residual.clone(),
-            components: components.into_iter().collect(),
-            culprit,
-            frame: None,
-            // What a stranger did is not taken back unasked.
-            mendable: false,
-            expected,
-            guests: BTreeSet::new(),
-            seen: None,
-        });
+        // What a stranger did is not taken back unasked.
+        let components = components.into_iter().collect();
+        self.world.is_otherwise(Broken { culprit, ..Broken::of_nobody(residual.clone(), components, expected) });
         self.changed();
-        if let Some(progress) = &self.given.progress {
-            progress(&Progress::Differs(residual));
-        }
+        self.given.tells(|| Progress::Differs(residual));
         for frame in losers {
             self.lose(frame.configuration, cause.clone());
         }

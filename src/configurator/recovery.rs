@@ -33,8 +33,8 @@ impl Engine {
     /// Has a worker make a call. Where none is made any more that is told.
     pub(super) fn call(&mut self, call: PlatformCall, deadline: Time, whose: CallFor) -> PoolTicket {
         let ticket = self.pool.start(call, deadline, whose);
-        if let (Some(why), Some(progress)) = (self.pool.take_refused(), &self.given.progress) {
-            progress(&Progress::Stuck(why));
+        if let Some(why) = self.pool.take_refused() {
+            self.given.tells(|| Progress::Stuck(why));
         }
         ticket
     }
@@ -120,9 +120,7 @@ impl Engine {
             Recovery::Back => self.recover_back(),
             Recovery::Accept => self.recover_accept(),
         };
-        if let Some(progress) = &self.given.progress {
-            progress(if recovered.is_ok() { &Progress::Recovered } else { &Progress::NotRecovered });
-        }
+        self.given.tells(|| if recovered.is_ok() { Progress::Recovered } else { Progress::NotRecovered });
         if recovered.is_ok() {
             self.look_whether_emptied();
         }

@@ -89,15 +89,7 @@ impl Engine {
                     let difference = system::diff(&self.world.as_meant(broken), &self.world.system);
                     let residual = Arc::new(Residual { cause, difference, ..(*broken.residual).clone() });
                     self.world.broken[at].residual = residual.clone();
-                    *part = PartEnd::Broken(Box::new(BrokenPart {
-                        residual,
-                        frame: None,
-                        instead: None,
-                        expected: Snapshot::default(),
-                        guests: BTreeSet::new(),
-                        gone: Edits::default(),
-                        also: Vec::new(),
-                    }));
+                    *part = PartEnd::Broken(Box::new(BrokenPart::of(residual)));
                 }
             }
             _ => group.left = None,
@@ -142,18 +134,8 @@ impl Engine {
         let Some(LeftBeside { residual, expected, guests }) = beside else { return };
         let components = residual.components().collect();
         let of = residual.clone();
-        let (culprit, frame, seen) = (None, None, None);
         let expects = expected.clone();
-        self.world.ends_broken(Broken {
-            residual,
-            components,
-            culprit,
-            frame,
-            mendable: false,
-            expected: expects,
-            guests,
-            seen,
-        });
+        self.world.ends_broken(Broken { guests, ..Broken::of_nobody(residual, components, expects) });
         self.leave(&of, expected);
     }
 
@@ -349,9 +331,7 @@ impl Engine {
                 self.returned = CameBack::Later;
                 at += 1;
             } else if self.repair(at, By::Nobody).is_ok() {
-                if let Some(progress) = &self.given.progress {
-                    progress(&Progress::Recovered);
-                }
+                self.given.tells(|| Progress::Recovered);
             } else {
                 at += 1;
             }

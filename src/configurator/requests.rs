@@ -139,9 +139,7 @@ impl Engine {
             };
             let serves: SmallVec<[RequestId; 2]> = group.places.iter().map(|place| requests[*place].id).collect();
             for place in &group.places {
-                if let Some(progress) = &self.given.progress {
-                    progress(&Progress::Begun { request: requests[*place], steps: planned.steps.len() });
-                }
+                self.given.tells(|| Progress::Begun { request: requests[*place], steps: planned.steps.len() });
             }
             self.prepare(&planned);
             let spec = self.spec(&planned, false);

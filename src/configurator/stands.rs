@@ -211,9 +211,7 @@ impl Engine {
         self.forget_standing(id);
         self.standings.of.insert(id, Standing { watch: HoldsWatch::Over, runs: Vec::new(), lost: true });
         self.changed();
-        if let Some(progress) = &self.given.progress {
-            progress(&Progress::Lost { configuration: id, reason: Arc::new(reason) });
-        }
+        self.given.tells(|| Progress::Lost { configuration: id, reason: Arc::new(reason) });
     }
 
     /// What a configuration had done, and was not there any more, is so again. What it stands for is not watched before it is applied anew.

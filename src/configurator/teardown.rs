@@ -5,10 +5,10 @@ use super::engine::{Engine, Force};
 use super::request::Reason;
 use super::running::{Purpose, Running};
 use crate::limits;
-use crate::model::{ConfigId, Origin, RequestId, Step};
-use crate::plan::{PlanStage, PlannedStep};
+use crate::model::{ConfigId, RequestId, Step};
+use crate::plan::PlannedStep;
 use crate::stack::{Broken, FrameId, Part, Planned, Residual, Why};
-use crate::system::{self, Reversibility, System, Undo};
+use crate::system::{self, System};
 use crate::time::Time;
 use crate::transaction::{Input, Limit, Spec, Transaction};
 use smallvec::SmallVec;
@@ -103,16 +103,8 @@ impl Engine {
                 ..Residual::of(cause)
             };
             let components = down.left.components.keys().copied().chain(down.quarantined.iter().copied()).collect();
-            self.world.breaks(Broken {
-                residual: Arc::new(residual),
-                components,
-                culprit: None,
-                frame: None,
-                mendable: true,
-                expected: crate::model::Snapshot::default(),
-                guests: BTreeSet::new(),
-                seen: None,
-            });
+            let broken = Broken::of_nobody(Arc::new(residual), components, crate::model::Snapshot::default());
+            self.world.breaks(Broken { mendable: true, ..broken });
         }
         down.in_time = self.given.clock.now() <= deadline;
         self.taking_down = false;
@@ -217,15 +209,10 @@ impl Engine {
         let machine = Transaction::new(own_plan(work, &self.world.system), spec);
         let done = self.carry_out(machine);
         down.forced.extend(done.done_so_far().map(|(planned, _)| planned.step.clone()));
-        down.troubles.extend(troubles_of(done));
+        down.troubles.extend(done.failures());
         self.see_left(down);
         down.quarantined.clone_from(&self.world.quarantined);
     }
-}
-
-/// What a best effort could not do.
-fn troubles_of(machine: Transaction) -> Vec<Reason> {
-    machine.failures()
 }
 
 /// Steps of the configurator's own as a plan of one part.
@@ -254,27 +241,13 @@ pub(super) fn own_plan(steps: Vec<PlannedStep>, system: &System) -> Planned {
 /// The steps to nothing in an order that leaves room: run states one after the other (producers before consumers), then
 /// all disconnections side by side, then all destructions.
 fn taking_apart(steps: impl Iterator<Item = Step>) -> Vec<PlannedStep> {
-    let mut work: Vec<PlannedStep> = Vec::new();
-    for (id, step) in (0u32..).zip(steps) {
+    let planned = |(id, step): (u32, Step)| {
         let (wave, after) = match step {
             Step::State { .. } => (0, id.checked_sub(1).into_iter().collect()),
             Step::Destroy { .. } => (2, SmallVec::new()),
             _ => (1, SmallVec::new()),
         };
-        let undo = Undo::Nothing;
-        let reversibility = Reversibility::Exact;
-        work.push(PlannedStep {
-            id,
-            stage: PlanStage::Changes,
-            wave,
-            after,
-            step,
-            reversibility,
-            undo,
-            moves: false,
-            undo_moves: false,
-            origin: Origin::NONE,
-        });
-    }
-    work
+        PlannedStep::bare(step, id, wave, after)
+    };
+    (0u32..).zip(steps).map(planned).collect()
 }

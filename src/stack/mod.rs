@@ -126,6 +126,19 @@ pub struct Frame {
 }
 
 impl Frame {
+    /// Whether two frames differ in nothing but number and age, and what undoes them and what they touch: these may be shared, which is looked at first.
+    pub(crate) fn is_like(&self, other: &Self) -> bool {
+        (self.configuration, self.group, self.requester, self.scope)
+            == (other.configuration, other.group, other.requester, other.scope)
+            && (self.left, self.partial, self.safe, &self.floor)
+                == (other.left, other.partial, other.safe, &other.floor)
+            && self.parts == other.parts
+            && self.saved == other.saved
+            && self.owes == other.owes
+    }
+}
+
+impl Frame {
     /// The steps it was applied with; none for a squashed frame.
     pub fn steps(&self) -> &[PlannedStep] {
         match &self.inverse {

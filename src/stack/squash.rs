@@ -58,7 +58,7 @@ impl SquashedFrames {
             self.alike.clear();
         }
         let alike = self.alike.entry([a, b, c, d]).or_default();
-        let fits = |Remembered { of: [a, b], .. }: &&Remembered| is_alike(a, lower) && is_alike(b, upper);
+        let fits = |Remembered { of: [a, b], .. }: &&Remembered| a.is_like(lower) && b.is_like(upper);
         if let Some(Remembered { made, .. }) = alike.iter().find(fits) {
             return Arc::new(Frame { id: upper.id, at: upper.at, ..(**made).clone() });
         }
@@ -75,15 +75,6 @@ fn shared(frame: &Frame) -> [usize; 2] {
         Inverse::List(items) => Arc::as_ptr(items) as usize,
     };
     [inverse, Arc::as_ptr(&frame.footprint) as usize]
-}
-
-/// Whether two frames that share their inverse and footprint differ in nothing but number and age.
-fn is_alike(a: &Frame, b: &Frame) -> bool {
-    (a.configuration, a.group, a.requester, a.scope) == (b.configuration, b.group, b.requester, b.scope)
-        && (a.left, a.partial, a.safe, &a.floor) == (b.left, b.partial, b.safe, &b.floor)
-        && a.parts == b.parts
-        && a.saved == b.saved
-        && a.owes == b.owes
 }
 
 /// Whose frames are squashed, and how far that may go.

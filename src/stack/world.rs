@@ -30,6 +30,14 @@ pub struct Broken {
     pub seen: Option<SafeWrites>,
 }
 
+impl Broken {
+    /// What no configuration is known to have left so, and what is not mended unasked.
+    pub fn of_nobody(residual: Arc<Residual>, components: BTreeSet<ComponentName>, expected: Snapshot) -> Self {
+        let (culprit, frame, guests, seen) = (None, None, BTreeSet::new(), None);
+        Self { residual, components, culprit, frame, mendable: false, expected, guests, seen }
+    }
+}
+
 /// What safe configurations in force had done when something was seen that is otherwise.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SafeWrites {

@@ -89,6 +89,14 @@ pub struct BrokenPart {
     pub also: Vec<Frame>,
 }
 
+impl BrokenPart {
+    /// One of which nothing is left but that it is not known.
+    pub fn of(residual: Arc<Residual>) -> Self {
+        let (expected, guests, gone) = (Snapshot::default(), BTreeSet::new(), Edits::default());
+        Self { residual, frame: None, instead: None, expected, guests, gone, also: Vec::new() }
+    }
+}
+
 impl Transaction {
     /// Everything was tried: it is done, or, best effort, what could not be done is named.
     pub(super) fn end_forward(&mut self, live: &System, can: &Can<'_>) {
@@ -368,16 +376,7 @@ impl Transaction {
     /// The end of a part of which nothing is left, but which was broken off: nobody vouches for it.
     fn broken_whole(&self, observed: bool) -> PartEnd {
         let residual = Arc::new(Residual { observed, ..Residual::of(self.reason()) });
-        let (expected, guests, gone) = (Snapshot::default(), BTreeSet::new(), Edits::default());
-        PartEnd::Broken(Box::new(BrokenPart {
-            residual,
-            frame: None,
-            instead: None,
-            expected,
-            guests,
-            gone,
-            also: Vec::new(),
-        }))
+        PartEnd::Broken(Box::new(BrokenPart::of(residual)))
     }
 
     /// Parts before `part` that do not stand: a call of theirs was neither done nor finished, or what they lead to is not
