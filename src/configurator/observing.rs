@@ -14,7 +14,6 @@ use crate::stack::{Broken, Frame};
 use crate::system::touch::{self, Access, Slot, touches};
 use crate::system::{self, View as _};
 use rustc_hash::FxHashSet;
-use std::collections::BTreeSet;
 use std::sync::Arc;
 
 impl Engine {

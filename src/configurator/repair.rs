@@ -14,7 +14,6 @@ use crate::plan::undo::in_order;
 use crate::stack::{Broken, Edits, FrameId, Group, HandOver, Inverse, Residual, Why, keeps_still};
 use crate::system::{self, View as _, step, touch};
 use crate::transaction::{BrokenPart, LeftBeside, PartEnd, Spec, Transaction};
-use std::collections::BTreeSet;
 use std::sync::Arc;
 
 /// What came of repairing something.

@@ -12,7 +12,6 @@ use crate::system::{self, System};
 use crate::time::Time;
 use crate::transaction::{Input, Limit, Spec, Transaction};
 use smallvec::SmallVec;
-use std::collections::BTreeSet;
 use std::sync::Arc;
 
 impl Engine {
