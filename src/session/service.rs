@@ -208,7 +208,7 @@ fn refused_while_stopping(session: &Session, method: &str, params: &Json) -> Res
     let deployment = session.deployment();
     let message = format!("`{}` is being stopped: {what} is refused", deployment.name);
     let help = format!(
-        "safety events, `{}` and `recover` stay open; `davit status` shows what it waits for",
+        "safety events, `{}`, `recover` and `davit shutdown --force` stay open; `davit status` shows what it waits for",
         deployment.shutdown.event
     );
     Err(RpcError::helped(GOING_DOWN, message, help))

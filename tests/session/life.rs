@@ -184,6 +184,12 @@ fn a_script_that_fails_leaves_nothing_behind() {
         ("deploy('@generic_arm.yaml') wait_answer('eight_DOF.okk', 1)", "did you mean `eight_DOF.ok`?"),
         ("deploy('@generic_arm.yaml') wait_answer('eigth_DOF.ok', 1)", "did you mean `eight_DOF.ok`?"),
         ("deploy('@generic_arm.yaml') wait_answer('undo.dome', 1)", "did you mean `undo.done`?"),
+        // What is answered so is meant so.
+        (
+            "deploy('@generic_arm.yaml') local _, why = pcall(wait_answer, 'undo.done', 0.1)
+             error('not heard: ' .. tostring(why:find('did you mean') == nil and why:find('was not heard in') ~= nil), 0)",
+            "not heard: true",
+        ),
         ("deploy('@generic_arm.yaml') port('follower.folow')", "did you mean `follow`?"),
         ("deploy('@generic_arm.yaml') port('folower.follow')", "did you mean `follower`?"),
         ("deploy('@generic_arm.yaml') undo('eight_DOF', {force = 1})", "`force` is true or false"),

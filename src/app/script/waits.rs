@@ -93,7 +93,8 @@ pub(super) fn wait_answer(host: &SharedHost, event: &str, seconds: f64) -> mlua:
 /// Which event that coordinators know may be meant by one that none of them knows: a component may raise it all the same.
 fn meant_event(session: &Session, event: &str) -> String {
     let known = session.events();
-    if known.iter().any(|known| known.as_str() == event) {
+    // What is answered so, and only did not come, is meant.
+    if known.iter().any(|known| known.as_str() == event) || session.deployment().looks_like_answer(event) {
         return String::new();
     }
     let near = nearest(event, known.iter().map(|known| known.as_str()));

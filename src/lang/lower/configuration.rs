@@ -284,8 +284,18 @@ fn call(cx: &mut Cx, fields: &mut Fields) -> Option<Call> {
 }
 
 fn policy(cx: &mut Cx, node: Node) -> Option<Policy> {
-    if let Kind::Str(_) = node.kind {
-        return choice(cx, &node, "the policy of a connection", &[("data", Policy::Data)]);
+    if let Kind::Str(text) = &node.kind {
+        if &**text == "data" {
+            return Some(Policy::Data);
+        }
+        let queue = cx.either(node.origin, "{ buffer = 8 }", "{ buffer: 8 }");
+        let message = format!("the policy of a connection cannot be `{text}`");
+        let help = format!(
+            "write `{queue}` for a queue of so many values; `data`, the newest value, is what it is without a word"
+        );
+        let place = cx.place(&node);
+        cx.report(Finding::error(codes::TEXT_BAD_VALUE, message).at(place).help(help));
+        return None;
     }
     let mut fields = Fields::of(cx, node, &BUFFER)?;
     let length = fields.whole(cx, "buffer");
