@@ -1,6 +1,6 @@
 //! Configurations: what both spellings mean.
 
-use super::{by_name, choice, entries, name, own_name, value};
+use super::{by_name, entries, name, own_name, value};
 use crate::lang::bound;
 use crate::lang::concern;
 use crate::lang::grammar::{BUFFER, CHANGES, CONFIGURATION, UNDO, primitive as primitive_of};
