@@ -441,13 +441,28 @@ fn parameters_are_handed_down() {
     // What is given to the inner one itself goes before.
     assert!(value(wide, &[("left.stiffness", "1.1"), ("left.inner.gain", "1.2")]).contains("D.k = 1.2"));
     // It is held to what both declare.
-    let (says, _) = one(&given("left: { deployment: mid.yaml, parameters: { stiffness: 3.0 } }"), "compose::parameter");
+    let high = given("left: { deployment: mid.yaml, parameters: { stiffness: 3.0 } }");
+    let (says, help) = one(&high, "compose::parameter");
     assert!(says.starts_with("the parameter `gain`: 3 is outside 0 … 2"), "{says}");
+    assert_eq!(help, "give a value from 0 to 2");
+    // It is shown where it was given, and where it is given on.
+    let told = load(&files(&high), "pair.yaml", &[]);
+    let high = told.findings.iter().find(|finding| finding.code.0 == "compose::parameter").unwrap();
+    let file = |origin| told.sources.file(told.sources.locate(origin).expect("a place").file).name.to_string();
+    let given_on = high.labels.iter().find(|label| label.text == "given on here").expect("where it is given on");
+    assert!(file(high.origin).ends_with("pair.yaml") && file(given_on.origin).ends_with("mid.yaml"), "{high:#?}");
     let mut slip = given(wide);
     slip[1].2 = "inner: { deployment: arm.yaml, parameters: { gain: { parameter: stifness } } }";
     let all = load(&files(&slip), "pair.yaml", &[]).findings;
     let told: Vec<_> = all.iter().filter(|f| f.is_error()).map(|f| (f.message.as_str(), f.help.as_deref())).collect();
     assert_eq!(told, [("this file has no parameter `stifness`", Some("did you mean `stiffness`?"))]);
+    let mut word = given(wide);
+    word[1].2 = "inner: { deployment: arm.yaml, parameters: { gain: { paramter: stiffness } } }";
+    let (says, help) = one(&word, "compose::parameter");
+    assert_eq!(
+        (says.as_str(), help.as_str()),
+        ("`paramter: stiffness` gives nothing on", "did you mean `parameter: stiffness`?")
+    );
     (slip[0].2, slip[2].2) = ("types: {}", "left: { deployment: mid.yaml }");
     let (says, help) = one(&slip, "compose::parameter");
     assert!(
