@@ -65,9 +65,6 @@ impl Product<'_> {
     /// Frames that waited for this event have been confirmed; perhaps, where it may be too late and what takes one back waits
     /// its turn.
     pub(super) fn confirm(&self, state: &mut ProductState, name: EventName) {
-        if self.worlds.confirms {
-            self.confirm_early(state, name);
-        }
         if !state.desk.is_empty() && !self.tells_all {
             return;
         }
@@ -86,7 +83,10 @@ impl Product<'_> {
     }
 
     /// What comes while the configuration is being applied confirms it as well.
-    fn confirm_early(&self, state: &mut ProductState, name: EventName) {
+    pub(super) fn confirm_early(&self, state: &mut ProductState, name: EventName) {
+        if !self.worlds.confirms {
+            return;
+        }
         let requests = state.desk.under_way().iter().flat_map(|active| active.batch.requests.iter());
         let applied = requests.filter_map(|request| match request.ask {
             Ask::Apply(id) if self.is_confirmed_by(id, name) && !state.confirmed.contains(&id) => Some(id),

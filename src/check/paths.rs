@@ -35,7 +35,9 @@ pub fn raised(deployment: &Deployment, name: EventName) -> Option<Finding> {
         None if own.contains('/') => {
             format!("what is inside of `{path}` is led by its own coordinator: raise what that accepts, {list}")
         }
-        None => format!("`{path}` accepts {list}; list `{own}` under `accepts` in its file if it is to take it"),
+        None => format!(
+            "`{path}` accepts {list}: what it is to take its coordinator hears, and its file lists under `accepts`"
+        ),
     };
     Some(Finding::error(COORD_UNKNOWN_REQUEST, message).also(subsystem.origin, "the subsystem").help(help))
 }

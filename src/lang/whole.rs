@@ -103,7 +103,7 @@ impl DeploymentReader<'_> {
             draft.subsystems.iter().any(|subsystem| first == Some(subsystem.name.as_str()))
         };
         let declared = &draft.deployment.interface.parameters;
-        let (mut given, mut others) = (part.given, Vec::new());
+        let (mut given, mut given_on, mut others) = (part.given, part.given_on, Vec::new());
         for (path, text) in set.iter().filter(|(path, _)| !inner(path)) {
             let Some((_, parameter)) = declared.iter().find(|(name, _)| name.as_str() == path) else {
                 others.push((path.clone(), text.clone()));
@@ -111,12 +111,13 @@ impl DeploymentReader<'_> {
             };
             if let Some((value, origin)) = params::value_for(cx, &part.within, (path, text), &parameter.ty) {
                 given.retain(|entry| entry.key != path.as_str());
+                given_on.retain(|(name, _)| name != path.as_str());
                 given.push(Entry { key: path.clone().into(), origin, value });
             }
         }
         let mut with = draft.with;
         let at = if part.at.is_some() { part.at } else { origin };
-        let own = interface::given(cx, (declared, &draft.ill), (given, &part.given_on), (&part.of, &part.within), at);
+        let own = interface::given(cx, (declared, &draft.ill), (given, &given_on), (&part.of, &part.within), at);
         let handed = interface::hand_down(cx, &mut draft.subsystems, &own);
         let subsystems = self.subsystems(cx, &folder, draft.subsystems, (&part.within, set))?;
         for entry in own {
