@@ -28,10 +28,6 @@ impl Product<'_> {
     pub(super) fn follow(&mut self, mut state: ProductState, by: usize, reaction: &Macrostep) -> States {
         state.leaves[by] = reaction.leaf;
         self.forget(&mut state, by, reaction);
-        // What is asked for in the same step begins after what is raised in it.
-        for emitted in &reaction.emitted {
-            self.confirm_early(&mut state, emitted.event);
-        }
         let mut states = one(state);
         // A coordinator that does not come to rest asks without end, and each time may come before or after what ends.
         self.forked |= reaction.handed.len() > limits::CHECK_HANDED;

@@ -236,19 +236,12 @@ impl Product<'_> {
 
     /// What a request that was carried out leaves to be waited for.
     fn applied(&self, state: &mut ProductState, request: &Request, verdict: Verdict, went: &Went) {
-        let Ask::Apply(id) = request.ask else { return };
-        let confirmed = state.confirmed.contains(&id);
-        if confirmed {
-            state.change(|seldom| seldom.confirmed.retain(|of| *of != id));
-        }
-        if verdict != Verdict::Ok {
-            return;
-        }
+        let (Ask::Apply(id), Verdict::Ok) = (request.ask, verdict) else { return };
         if state.lost.contains(&id) {
             state.change(|seldom| seldom.lost.retain(|lost| *lost != id));
         }
         self.stands_for(state, id);
-        let waits = !confirmed && self.worlds.configuration(id).is_some_and(|c| c.confirm.is_some());
+        let waits = self.worlds.configuration(id).is_some_and(|c| c.confirm.is_some());
         // One batch may push several of them.
         let free = |place: u8| state.unconfirmed.iter().all(|waits| waits.place != place);
         let pushed = went.places.iter().flat_map(|places| &places.pushed);

@@ -5,7 +5,7 @@ use super::product::Product;
 use super::seldom::Unconfirmed;
 use super::state::{Answers, Failed, Move, Next, Nexts, ProductState, States, add, index};
 use crate::limits;
-use crate::model::{Ask, ConfigId, EventName};
+use crate::model::{Ask, EventName};
 use crate::statechart::EventId;
 use smallvec::SmallVec;
 
@@ -72,43 +72,12 @@ impl Product<'_> {
             return;
         }
         let waits_on = |waits: &Unconfirmed| match waits.request.ask {
-            Ask::Apply(id) => !self.is_confirmed_by(id, name),
+            Ask::Apply(id) => {
+                self.worlds.configuration(id).and_then(|c| c.confirm).is_none_or(|confirm| confirm.event != name)
+            }
             _ => false,
         };
         state.change(|seldom| seldom.unconfirmed.retain(waits_on));
-    }
-
-    fn is_confirmed_by(&self, id: ConfigId, name: EventName) -> bool {
-        self.worlds.configuration(id).and_then(|c| c.confirm).is_some_and(|confirm| confirm.event == name)
-    }
-
-    /// What comes while the configuration is being applied confirms it as well.
-    pub(super) fn confirm_early(&self, state: &mut ProductState, name: EventName) {
-        if !self.worlds.confirms {
-            return;
-        }
-        let requests = state.desk.under_way().iter().flat_map(|active| active.batch.requests.iter());
-        let applied = requests.filter_map(|request| match request.ask {
-            Ask::Apply(id) if self.is_confirmed_by(id, name) && !state.confirmed.contains(&id) => Some(id),
-            _ => None,
-        });
-        let early: SmallVec<[ConfigId; 2]> = applied.collect();
-        if !early.is_empty() {
-            state.change(|seldom| {
-                early.into_iter().for_each(|id| seldom.confirmed.push(id));
-                seldom.confirmed.sort_unstable();
-            });
-        }
-    }
-
-    /// What is no more under way, however that came, was not confirmed by what came before.
-    pub(super) fn forget_early(&self, state: &mut ProductState) {
-        if state.confirmed.is_empty() {
-            return;
-        }
-        let under_way = state.desk.under_way().iter().flat_map(|active| active.batch.requests.iter());
-        let under_way: SmallVec<[Ask; 4]> = under_way.map(|request| request.ask).collect();
-        state.change(|seldom| seldom.confirmed.retain(|id| under_way.contains(&Ask::Apply(*id))));
     }
 
     /// Gives answers, one after the other; each is heard before the next comes.

@@ -214,7 +214,6 @@ impl Product<'_> {
         // Somebody wants it up again.
         next.stopping &= name != self.deployment.deploy.event;
         next.leaving |= name == self.deployment.shutdown.event;
-        self.confirm_early(&mut next, name);
         self.confirm(&mut next, name);
         let hearers = self.hearers(&next, name, None);
         // If one alone hears it, there is nothing to wait for, unless more may come before it does.

@@ -61,8 +61,6 @@ pub struct Seldom {
     pub telling: SharedList<(Request, Verdict)>,
     /// Frames that wait for their confirmation.
     pub unconfirmed: SharedList<Unconfirmed>,
-    /// Configurations under way whose confirmation has come already.
-    pub confirmed: SharedList<ConfigId>,
     /// Configurations that were lost, and are not applied anew.
     pub lost: SharedList<ConfigId>,
     /// Configurations in force of which something that ran when they were applied was stopped since: what they stand for is watched
@@ -85,7 +83,6 @@ pub const NOTHING: &Seldom = &Seldom {
     due: SharedList::new(),
     telling: SharedList::new(),
     unconfirmed: SharedList::new(),
-    confirmed: SharedList::new(),
     lost: SharedList::new(),
     over: SharedList::new(),
     in_transit: SharedList::new(),
