@@ -54,9 +54,11 @@ pub fn configurations(cx: &mut Cx, node: Node) -> Vec<Configuration> {
         let reserved = RESERVED.iter().find(|(name, _)| *name == &*entry.key);
         if let Some((name, means)) = reserved {
             let finding = Finding::error(codes::CONF_RESERVED, format!("a configuration cannot be called `{name}`"));
-            let place = cx.part(entry.origin, &entry.key);
             cx.report(
-                finding.at(place).labelled(format!("where a coordinator names it, {means}")).help("take another name"),
+                finding
+                    .at(entry.origin)
+                    .labelled(format!("where a coordinator names it, {means}"))
+                    .help("take another name"),
             );
         }
         // Without a name its inside is still looked at, so that all findings come at once.
