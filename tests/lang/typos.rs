@@ -143,6 +143,16 @@ ConfiguratorConf {
 }
 ";
 
+/// What asks for undoing is no configuration's name.
+#[test]
+fn a_configuration_is_not_called_undo() {
+    let text = "ConfiguratorConf { undo = Configuration { destroy(\"A\") } }";
+    let loaded =
+        lang::load_configurations(&Sources::memory([("c.lua", text)]), Path::new("c.lua"), &LoadOptions::default());
+    let codes: Vec<&str> = loaded.findings.iter().map(|finding| finding.code.0).collect();
+    assert_eq!((codes, loaded.configurations.len()), (vec!["conf::reserved_name"], 0));
+}
+
 #[test]
 fn configurations_in_lua() {
     let table = [
@@ -199,7 +209,6 @@ fn configurations_in_lua() {
         ("buffer = 8", "bufer = 8", "text::unknown_key 6:29", "`buffer`"),
         ("buffer = 8", "buffer = 0", "text::bad_value 6:38", "1 to"),
         ("{ buffer = 8 }", "\"dta\"", "text::bad_value 6:27", "`{ buffer = 8 }`"),
-        ("up = Configuration {", "undo = Configuration {", "conf::reserved_name 2:10", "another name"),
         ("up = Configuration {", "e_done = Configuration {", "conf::reserved_name 2:12", "another name"),
         ("connect(\"A.y\", \"B.u\", { buffer = 8 })", "connect(\"A.y\")", "text::missing_key 6:5", "`to`"),
         ("connect(\"A.y\", \"B.u\", { buffer = 8 })", "destroy(\"A\", 1)", "lua::arguments 6:5", "destroy(component)"),
