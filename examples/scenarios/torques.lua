@@ -128,9 +128,9 @@ during("led down from within a motion, held and parked", function()
   for _, robot in ipairs(ROBOTS) do wait_answer(robot .. "/park.ok", 12) end
 end)
 wait_state("pair:idle", 20)
-figure{ name = "all of it", value = worst, unit = "N m" }
 raise("e_start")
 wait_state("left:unfolding", 2)
 during("unfolding, and taking over", function()
   for _, robot in ipairs(ROBOTS) do wait_state(robot .. ":unsync", 8) end
 end)
+figure{ name = "all of it", value = worst, unit = "N m" }
