@@ -31,25 +31,39 @@ impl Product<'_> {
         let mut states = one(state);
         // A coordinator that does not come to rest asks without end, and each time may come before or after what ends.
         self.forked |= reaction.handed.len() > limits::CHECK_HANDED;
-        for batch in reaction.handed.iter().take(limits::CHECK_HANDED) {
+        for (before, batch) in reaction.handed.iter().take(limits::CHECK_HANDED).enumerate() {
+            self.confirms_early(&mut states, reaction, before);
             states = self.all_arrive(states, batch);
             self.forked |= states.len() > limits::CHECK_FORKS;
             states.truncate(limits::CHECK_FORKS);
         }
+        self.confirms_early(&mut states, reaction, reaction.handed.len());
         for emitted in &reaction.emitted {
             let name = emitted.event;
+            let late: States = states.iter().filter_map(|state| self.confirmed_too_late(state, name)).collect();
+            states.iter_mut().for_each(|state| self.confirm(state, name));
+            add(&mut states, late);
+            self.forked |= states.len() > limits::CHECK_FORKS;
+            states.truncate(limits::CHECK_FORKS);
             for state in &mut states {
                 if self.parent.as_ref().is_some_and(|parent| parent.hears.contains(&name)) {
                     state.told.push(name);
                 }
                 self.tells_child(state, by, *emitted);
-                self.confirm(state, name);
                 let hearers = self.hearers(state, name, Some(by));
                 self.spread_to(state, &hearers);
                 self.offers_child(state, by, *emitted, &hearers);
             }
         }
         states
+    }
+
+    /// What is told behind so many batches confirms what these, and others before, ask for. Where several coordinators ask it is
+    /// not known what came first.
+    fn confirms_early(&self, states: &mut States, reaction: &Macrostep, behind: usize) {
+        for emitted in reaction.emitted.iter().filter(|emitted| self.members.len() == 1 && emitted.behind == behind) {
+            states.iter_mut().for_each(|state| self.confirm_early(state, emitted.event));
+        }
     }
 
     /// Nobody hears the answers any more whose state has been left.

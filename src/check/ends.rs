@@ -236,12 +236,19 @@ impl Product<'_> {
 
     /// What a request that was carried out leaves to be waited for.
     fn applied(&self, state: &mut ProductState, request: &Request, verdict: Verdict, went: &Went) {
-        let (Ask::Apply(id), Verdict::Ok) = (request.ask, verdict) else { return };
+        let Ask::Apply(id) = request.ask else { return };
+        let confirmed = state.confirmed.contains(&id);
+        if confirmed {
+            state.change(|seldom| seldom.confirmed.retain(|of| *of != id));
+        }
+        if verdict != Verdict::Ok {
+            return;
+        }
         if state.lost.contains(&id) {
             state.change(|seldom| seldom.lost.retain(|lost| *lost != id));
         }
         self.stands_for(state, id);
-        let waits = self.worlds.configuration(id).is_some_and(|c| c.confirm.is_some());
+        let waits = !confirmed && self.worlds.configuration(id).is_some_and(|c| c.confirm.is_some());
         // One batch may push several of them.
         let free = |place: u8| state.unconfirmed.iter().all(|waits| waits.place != place);
         let pushed = went.places.iter().flat_map(|places| &places.pushed);
@@ -250,7 +257,7 @@ impl Product<'_> {
         if let (true, Some(place)) = (waits, pushed.next().map(|(_, place)| *place).or(unknown)) {
             // In which state it was asked for means nothing any more.
             let request = Request { why: Why::Asked, tag: (0, 0), ..*request };
-            state.change(|seldom| seldom.unconfirmed.push(Unconfirmed { place, request }));
+            state.change(|seldom| seldom.unconfirmed.push(Unconfirmed { place, request, late: false }));
         }
     }
 

@@ -386,6 +386,7 @@ impl Graph<'_, '_> {
     /// following that is not easy, nothing is known from there on but that it is in force.
     fn abstracted(&mut self, next: Next, so_far: Failed) -> (ProductState, Failed) {
         let Next { mut state, failed, by_hand, .. } = next;
+        self.product.forget_early(&mut state);
         if !by_hand || self.product.worlds.top(state.world).is_some() {
             return (state, failed);
         }

@@ -5,7 +5,7 @@ use super::product::Product;
 use super::seldom::Unconfirmed;
 use super::state::{Answers, Failed, Move, Next, Nexts, ProductState, States, add, index};
 use crate::limits;
-use crate::model::{Ask, EventName};
+use crate::model::{Ask, ConfigId, EventName};
 use crate::statechart::EventId;
 use smallvec::SmallVec;
 
@@ -62,22 +62,58 @@ impl Product<'_> {
         hearers
     }
 
-    /// Frames that waited for this event have been confirmed; perhaps, where it may be too late and what takes one back waits
-    /// its turn.
+    /// Frames that waited for this event have been confirmed.
     pub(super) fn confirm(&self, state: &mut ProductState, name: EventName) {
-        if !state.desk.is_empty() && !self.tells_all {
+        if state.unconfirmed.iter().any(|waits| self.is_for(waits, name)) {
+            state.change(|seldom| seldom.unconfirmed.retain(|waits| !self.is_for(waits, name)));
+        }
+    }
+
+    /// Where something is under way what confirms may come too late for a frame, and what takes that back waits. None: it cannot.
+    pub(super) fn confirmed_too_late(&self, state: &ProductState, name: EventName) -> Option<ProductState> {
+        let waits = !self.tells_all && state.unconfirmed.iter().any(|waits| self.is_for(waits, name));
+        (waits && !state.desk.is_empty()).then(|| {
+            let mut late = state.clone();
+            late.change(|seldom| {
+                seldom.unconfirmed.update(|waits| self.is_for(waits, name), |waits| waits.late = true)
+            });
+            late
+        })
+    }
+
+    fn is_for(&self, waits: &Unconfirmed, name: EventName) -> bool {
+        matches!(waits.request.ask, Ask::Apply(id) if !waits.late && self.is_confirmed_by(id, name))
+    }
+
+    fn is_confirmed_by(&self, id: ConfigId, name: EventName) -> bool {
+        self.worlds.configuration(id).and_then(|c| c.confirm).is_some_and(|confirm| confirm.event == name)
+    }
+
+    /// What comes while the configuration has been asked for, and is not there yet, confirms it as well.
+    pub(super) fn confirm_early(&self, state: &mut ProductState, name: EventName) {
+        if !self.worlds.confirms || state.desk.is_empty() {
             return;
         }
-        if state.unconfirmed.is_empty() {
+        let asked = state.desk.requests().filter_map(|request| match request.ask {
+            Ask::Apply(id) if self.is_confirmed_by(id, name) && !state.confirmed.contains(&id) => Some(id),
+            _ => None,
+        });
+        let early: SmallVec<[ConfigId; 2]> = asked.collect();
+        if !early.is_empty() {
+            state.change(|seldom| {
+                early.into_iter().for_each(|id| seldom.confirmed.push(id));
+                seldom.confirmed.sort_unstable();
+            });
+        }
+    }
+
+    /// What is asked for no more, however that came, was not confirmed by what came before.
+    pub(super) fn forget_early(&self, state: &mut ProductState) {
+        if state.confirmed.is_empty() {
             return;
         }
-        let waits_on = |waits: &Unconfirmed| match waits.request.ask {
-            Ask::Apply(id) => {
-                self.worlds.configuration(id).and_then(|c| c.confirm).is_none_or(|confirm| confirm.event != name)
-            }
-            _ => false,
-        };
-        state.change(|seldom| seldom.unconfirmed.retain(waits_on));
+        let asked: SmallVec<[Ask; 4]> = state.desk.requests().map(|request| request.ask).collect();
+        state.change(|seldom| seldom.confirmed.retain(|id| asked.contains(&Ask::Apply(*id))));
     }
 
     /// Gives answers, one after the other; each is heard before the next comes.

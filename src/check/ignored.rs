@@ -15,7 +15,7 @@ impl Product<'_> {
         &mut self,
         state: &mut ProductState,
         by: usize,
-        Emitted { event, owner }: Emitted,
+        Emitted { event, owner, .. }: Emitted,
         hearers: &[(u8, EventId)],
     ) {
         let (Some(owner), true) = (owner, self.is_for_child(by, event)) else { return };

@@ -51,7 +51,7 @@ impl Once {
             list(&mut self.answers, own);
         }
         list(&mut self.unconfirmed, &mut seldom.unconfirmed);
-        for own in [&mut seldom.lost, &mut seldom.over] {
+        for own in [&mut seldom.lost, &mut seldom.over, &mut seldom.confirmed] {
             list(&mut self.configurations, own);
         }
         list(&mut self.batches, &mut seldom.in_transit);

@@ -4,6 +4,7 @@ use super::judge::created;
 use super::members::Member;
 use super::offers::Offers;
 use super::product::Product;
+use super::seldom::Unconfirmed;
 use super::state::{Answers, Failed, Move, Next, Nexts, ProductState, Trouble, bit, index};
 use crate::limits;
 use crate::model::{Ask, ConfigId, EventName, RequestId, Verdict};
@@ -214,17 +215,21 @@ impl Product<'_> {
         // Somebody wants it up again.
         next.stopping &= name != self.deployment.deploy.event;
         next.leaving |= name == self.deployment.shutdown.event;
+        self.confirm_early(&mut next, name);
+        let late = self.confirmed_too_late(&next, name);
         self.confirm(&mut next, name);
-        let hearers = self.hearers(&next, name, None);
-        // If one alone hears it, there is nothing to wait for, unless more may come before it does.
-        if let [(only, event)] = hearers[..]
-            && next.inbox.is_empty()
-            && !self.crosses
-        {
-            self.hear(next, usize::from(only), event, by, nexts);
-        } else {
-            self.spread_to(&mut next, &hearers);
-            nexts.all.push(Next::plain(by, next, Failed::Nothing));
+        for mut next in std::iter::once(next).chain(late) {
+            let hearers = self.hearers(&next, name, None);
+            // If one alone hears it, there is nothing to wait for, unless more may come before it does.
+            if let [(only, event)] = hearers[..]
+                && next.inbox.is_empty()
+                && !self.crosses
+            {
+                self.hear(next, usize::from(only), event, by, nexts);
+            } else {
+                self.spread_to(&mut next, &hearers);
+                nexts.all.push(Next::plain(by, next, Failed::Nothing));
+            }
         }
     }
 
@@ -232,10 +237,16 @@ impl Product<'_> {
     pub(super) fn notices(&mut self, state: &ProductState, nexts: &mut Nexts) {
         for (at, waits) in state.unconfirmed.iter().enumerate() {
             let Ask::Apply(id) = waits.request.ask else { continue };
-            let mut next = state.clone();
-            next.change(|seldom| seldom.unconfirmed.remove(at));
-            nexts.all.push(Next::plain(Move::Confirmed(id), next, Failed::Nothing));
-            self.unconfirmed(state, at, id, nexts);
+            let event = self.worlds.configuration(id).and_then(|c| c.confirm).map(|confirm| confirm.event);
+            // What is heard comes by itself.
+            if let Some(event) = event.filter(|event| !waits.late && !self.is_heard(state, *event)) {
+                let mut next = state.clone();
+                self.confirm(&mut next, event);
+                nexts.all.push(Next::plain(Move::Confirmed(id), next, Failed::Nothing));
+            }
+            if !self.waits_behind_others(state, at) {
+                self.unconfirmed(state, at, id, nexts);
+            }
         }
         for at in 0..self.losable.len() {
             let (id, holds) = self.losable[at];
@@ -274,6 +285,21 @@ impl Product<'_> {
                 _ => nexts.all.push(Next::plain(by, next, class)),
             }
         }
+    }
+
+    /// Whether an event comes from outside, and some coordinator hears it.
+    fn is_heard(&mut self, state: &ProductState, event: EventName) -> bool {
+        self.outside.contains(&event) && !self.hearers(state, event, None).is_empty()
+    }
+
+    /// Whether one that came before it, and is to be confirmed within no more time, is taken back first.
+    fn waits_behind_others(&self, state: &ProductState, at: usize) -> bool {
+        let within = |waits: &Unconfirmed| match waits.request.ask {
+            Ask::Apply(id) => self.worlds.configuration(id).and_then(|c| c.confirm).map(|confirm| confirm.within),
+            _ => None,
+        };
+        let own = within(&state.unconfirmed[at]);
+        state.desk.is_empty() && state.unconfirmed.iter().take(at).any(|before| within(before) <= own)
     }
 
     /// A frame is taken back, since its confirmation did not come in time.

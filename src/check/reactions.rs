@@ -37,6 +37,8 @@ pub struct Emitted {
     pub event: EventName,
     /// The state that hears what is answered to it; none: that was left in the same step.
     pub owner: Option<NodeId>,
+    /// So many of the batches that are handed on go before it.
+    pub behind: usize,
 }
 
 impl Macrostep {
@@ -45,6 +47,9 @@ impl Macrostep {
         self.emitted.iter().any(|emitted| emitted.event == event)
     }
 }
+
+/// The step that emits it is not over.
+const NOT_YET: usize = usize::MAX;
 
 /// The number of the first entry.
 const FIRST_ENTRY: u32 = u32::MAX;
@@ -211,6 +216,9 @@ impl Hook for MacrostepRecorder<'_> {
         if !self.batch.requests.is_empty() {
             self.handed.push(std::mem::take(&mut self.batch));
         }
+        // What a step asks for goes before what it tells.
+        let handed = self.handed.len();
+        self.emitted.iter_mut().filter(|emitted| emitted.behind == NOT_YET).for_each(|emitted| emitted.behind = handed);
         let is_down = self.down.is_some_and(|down| view.leaf.is_some_and(|leaf| view.chart.is_inside(leaf, down)));
         if is_down && !self.is_down {
             let down = Request { why: Why::Down, ..Request::new(RequestId(0), Ask::Undo, self.by) };
@@ -239,7 +247,7 @@ impl Hook for MacrostepRecorder<'_> {
                 let tag = (raised.owner.index() as u64 + 1, 0);
                 self.batch.requests.push(Request { scope, tag, ..Request::new(RequestId(0), ask, self.by) });
             }
-            None => self.emitted.push(Emitted { event: raised.name, owner: Some(raised.owner) }),
+            None => self.emitted.push(Emitted { event: raised.name, owner: Some(raised.owner), behind: NOT_YET }),
         }
     }
 }

@@ -72,7 +72,12 @@ impl Product<'_> {
             if reverted && !before.desk.is_empty() {
                 all[k].does = Does::Cannot("what is taken back unconfirmed may have to wait for what is under way");
             }
-            if self.is_overdue(way, k, &times, &entries) {
+            let late = |state: &ProductState| state.unconfirmed.iter().filter(|waits| waits.late).count();
+            if late(&next.state) > late(before) {
+                all[k].does =
+                    Does::Cannot("what confirms comes too late, while what takes back waits for what is under way");
+            }
+            if self.is_unconfirmed_for_too_long(way, k, &times) || self.is_overdue(way, k, &times, &entries) {
                 all[k].does = Does::Cannot("a time is over before what comes first on the way is on its way");
             }
             if self.stands_after(next).is_none() {

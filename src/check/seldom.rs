@@ -28,6 +28,8 @@ pub struct Unconfirmed {
     pub place: u8,
     /// The request that pushed it.
     pub request: Request,
+    /// What confirms it came when it was too late, and what takes it back waits.
+    pub late: bool,
 }
 
 /// An event that a parent's coordinator has raised for a subsystem, until it was taken, or that it was ignored was heard.
@@ -61,6 +63,8 @@ pub struct Seldom {
     pub telling: SharedList<(Request, Verdict)>,
     /// Frames that wait for their confirmation.
     pub unconfirmed: SharedList<Unconfirmed>,
+    /// Configurations that were asked for, and whose confirmation has come before they are there.
+    pub confirmed: SharedList<ConfigId>,
     /// Configurations that were lost, and are not applied anew.
     pub lost: SharedList<ConfigId>,
     /// Configurations in force of which something that ran when they were applied was stopped since: what they stand for is watched
@@ -83,6 +87,7 @@ pub const NOTHING: &Seldom = &Seldom {
     due: SharedList::new(),
     telling: SharedList::new(),
     unconfirmed: SharedList::new(),
+    confirmed: SharedList::new(),
     lost: SharedList::new(),
     over: SharedList::new(),
     in_transit: SharedList::new(),

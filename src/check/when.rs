@@ -122,6 +122,27 @@ impl Product<'_> {
         self.members.iter().enumerate().any(timed)
     }
 
+    /// Whether a frame that nobody has confirmed is still there when it would have been taken back.
+    pub(super) fn is_unconfirmed_for_too_long(
+        &self,
+        way: &[(&ProductState, &Next)],
+        k: usize,
+        times: &[Duration],
+    ) -> bool {
+        let (before, next) = way[k];
+        let answered = |next: &Next, ask: Ask| next.answers.iter().any(|(request, _)| request.ask == ask);
+        before.unconfirmed.iter().any(|waits| {
+            let Ask::Apply(id) = waits.request.ask else { return false };
+            let within = self.worlds.configuration(id).and_then(|c| c.confirm).map(|confirm| confirm.within);
+            // Its place may be another one by now; and one that was pushed anew has waited for less.
+            let own = |of: &super::seldom::Unconfirmed| of.request.ask == waits.request.ask;
+            let new = |at: &usize| !way[*at].0.unconfirmed.iter().any(own) || answered(way[*at].1, waits.request.ask);
+            let pushed = (0..k).rev().find(new).unwrap_or(0);
+            let age = times[k].saturating_sub(times[pushed]);
+            !answered(next, waits.request.ask) && within.is_some_and(|within| age > within)
+        })
+    }
+
     /// When the frame whose confirmation did not come is taken back.
     fn applied_at(
         &self,

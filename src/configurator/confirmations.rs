@@ -1,9 +1,10 @@
 //! Frames that are taken back unless an event confirms them in time.
 
 use super::request::Request;
-use crate::model::{Confirm, EventName};
+use crate::model::{Confirm, EventName, RequestId};
 use crate::stack::{FrameId, Stack};
 use crate::time::Time;
+use smallvec::SmallVec;
 
 /// A frame that waits for its confirmation.
 pub(super) struct Confirming {
@@ -13,32 +14,30 @@ pub(super) struct Confirming {
     until: Time,
 }
 
-/// What waits for its confirmation, and confirming events that came while what they confirm was still being applied.
+/// What waits for its confirmation, and requests not answered yet whose confirming event has come since they came.
 #[derive(Default)]
 pub(super) struct Confirmations {
     waiting: Vec<Confirming>,
-    heard: Vec<(EventName, Time)>,
+    early: Vec<RequestId>,
 }
 
 impl Confirmations {
-    /// An event came that some configuration waits for; `early`: something is under way that it may be meant for.
-    pub fn came(&mut self, event: EventName, now: Time, early: bool) {
+    /// An event came that some configuration waits for; `asked`: the requests not answered yet that it confirms.
+    pub fn came(&mut self, event: EventName, asked: impl Iterator<Item = RequestId>) {
         self.waiting.retain(|waiting| waiting.event != event);
-        if early {
-            // The last time counts; there are no more of them than configurations wait for.
-            self.heard.retain(|(heard, _)| *heard != event);
-            self.heard.push((event, now));
+        for id in asked.filter(|id| !self.early.contains(id)).collect::<SmallVec<[RequestId; 4]>>() {
+            self.early.push(id);
         }
     }
 
-    /// Nothing is under way any more: what came early confirms nothing.
-    pub fn nothing_under_way(&mut self) {
-        self.heard.clear();
+    /// A request is answered, or nobody waits for that any more.
+    pub fn answered(&mut self, id: RequestId) {
+        self.early.retain(|early| *early != id);
     }
 
-    /// The frame of a request that began at that time waits from now on, unless its event has come already.
-    pub fn wait_for(&mut self, confirm: Confirm, request: Request, frame: FrameId, begun: Time, now: Time) {
-        if !self.heard.iter().any(|(event, at)| *event == confirm.event && *at >= begun) {
+    /// The frame of a request waits from now on, unless its event has come already.
+    pub fn wait_for(&mut self, confirm: Confirm, request: Request, frame: FrameId, now: Time) {
+        if !self.early.contains(&request.id) {
             let until = now + confirm.within;
             self.waiting.push(Confirming { request, frame, event: confirm.event, until });
         }

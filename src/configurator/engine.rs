@@ -3,6 +3,7 @@
 use super::conditions::{Conditions, Standings};
 use super::confirmations::Confirmations;
 use super::control::{ConfiguratorView, ControlCommand, Moment, QueuedCommand, StoppingBegan, UrgentCommand};
+use super::emergency::BeforeEmergency;
 use super::inbox::{Counts, Mail};
 use super::looks::Observing;
 use super::pool::Pool;
@@ -83,6 +84,8 @@ pub(super) struct Engine {
     /// Plans that are carried out again, at most so many of each configuration, the one used last at the end.
     pub switches: FxHashMap<ConfigId, Vec<Fast>>,
     pub confirmations: Confirmations,
+    /// What there was before the emergency that is not over.
+    pub before_emergency: Option<BeforeEmergency>,
     /// Coordinators that are down.
     pub down: BTreeSet<Requester>,
     /// Requests that have begun and were not answered.
@@ -131,6 +134,7 @@ impl Engine {
             told_broken: false,
             switches: FxHashMap::default(),
             confirmations: Confirmations::default(),
+            before_emergency: None,
             down: BTreeSet::new(),
             current: SmallVec::new(),
             revision: 0,
@@ -174,11 +178,13 @@ impl Engine {
             {
                 did = true;
                 self.begin(number);
+                self.look_whether_emergency_is_over();
                 if self.urgent() {
                     break;
                 }
             }
             did |= self.advance_all();
+            self.look_whether_emergency_is_over();
             self.review_standings();
             self.tell_fallen();
             self.look_at_suspects();
@@ -254,8 +260,7 @@ impl Engine {
         if self.counts.reports_lost.load(Ordering::Acquire) && self.counts.reports_lost.swap(false, Ordering::AcqRel) {
             self.suspects.report_all(&self.world.system);
             self.returned = CameBack::Now;
-            let (now, early) = (self.given.clock.now(), !self.current.is_empty());
-            self.counts.missed().into_iter().for_each(|event| self.confirmations.came(event, now, early));
+            self.counts.missed().into_iter().for_each(|event| self.confirmed(event));
         }
     }
 
@@ -274,7 +279,7 @@ impl Engine {
             Mail::Answers => self.counts.answers.store(false, Ordering::Release),
             Mail::Event(event) => {
                 self.counts.report_taken();
-                self.confirmations.came(event, self.given.clock.now(), !self.current.is_empty());
+                self.confirmed(event);
             }
             Mail::Command(ControlCommand::AtOnce(command)) => {
                 self.counts.command_taken(command.only_asks());
@@ -409,15 +414,14 @@ impl Engine {
         // No longer owed, whatever the listeners do with it.
         let (_, begun) = self.current.remove(at);
         self.note_answered(&request);
-        if self.current.is_empty() {
-            self.confirmations.nothing_under_way();
-        }
+        self.confirmations.answered(request.id);
         self.tell_answer(request, verdict, reason.map(Arc::new), begun);
     }
 
     /// What was owed is over, and nobody is told.
     pub fn forget(&mut self, request: Request) {
         self.current.retain(|(r, _)| !(r.id == request.id && r.ask == request.ask && r.why == request.why));
+        self.confirmations.answered(request.id);
     }
 
     /// Tells an answer, or a notice in the form of one.

@@ -25,6 +25,7 @@ mod confirmations;
 pub mod control;
 mod defining;
 mod down;
+mod emergency;
 mod engine;
 mod fast;
 mod handle;

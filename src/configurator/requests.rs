@@ -8,7 +8,7 @@ use super::progress::Progress;
 use super::repair::Repaired;
 use super::request::{Reason, Request};
 use super::running::{Purpose, Running};
-use crate::model::{Ask, ConfigId, RequestId, Step, Verdict};
+use crate::model::{Ask, ConfigId, EventName, RequestId, Step, Verdict};
 use crate::stack::{
     About, Batch, Broken, Endings, Frame, FrameId, Gone, Group, Part, Pile, Planned, Rules, Stopped, TakenAlong, Why,
     settle, take_up,
@@ -431,12 +431,23 @@ impl Engine {
         }
     }
 
+    /// An event came that confirms what waits for it, and what has been asked for and is not answered yet.
+    pub(super) fn confirmed(&mut self, event: EventName) {
+        let configurations = &self.given.configurations;
+        let asked = self.desk.requests().filter(|request| match request.ask {
+            Ask::Apply(id) => {
+                configurations.get(&id).and_then(|c| c.confirm).is_some_and(|confirm| confirm.event == event)
+            }
+            _ => false,
+        });
+        self.confirmations.came(event, asked.map(|request| request.id));
+    }
+
     /// A frame waits for its confirmation, unless that has come already.
     pub(super) fn await_confirmation(&mut self, request: Request, frame: FrameId) {
         let Ask::Apply(id) = request.ask else { return };
         let Some(confirm) = self.given.configurations.get(&id).and_then(|c| c.confirm) else { return };
-        let begun = self.current.iter().find(|(r, _)| r.id == request.id).map_or(Time::default(), |(_, begun)| *begun);
-        self.confirmations.wait_for(confirm, request, frame, begun, self.given.clock.now());
+        self.confirmations.wait_for(confirm, request, frame, self.given.clock.now());
     }
 
     pub(super) fn forget_confirmations(&mut self) {

@@ -771,6 +771,11 @@ codes! {
          reported done and was not, or somebody else changed them. They are broken: a request that names one of them is \
          refused, and the coordinator hears `ID.lost` of the newest configuration that wrote what differs. `davit drift` shows \
          the difference, `davit recover --back` mends it, `davit recover --accept` takes the system as it is.";
+    LEFT_BY_EMERGENCY = "run::left_by_emergency", "an emergency is over, and something is not as before it",
+        "Safe configurations were applied, something failed, was late or was interrupted meanwhile, and all of them were taken \
+         back. What is in force now was in force before, and the system is not as it was then: what one of them, or what it \
+         interrupted, had done was taken for somebody else's. Where nothing moves by that it is put right at once; else it is \
+         broken until somebody recovers it. `davit drift` shows the difference.";
     INTERRUPTED = "run::interrupted", "a safe configuration went first",
         "A configuration marked `safe` was requested while this request was being carried out. No further step of it was issued, \
          the safe configuration was applied, and what it did not touch was rolled back. Ask again when it is safe to.";

@@ -72,6 +72,8 @@ pub enum Reason {
     StandsNoMore(ConfigId),
     /// A later look at the platform shows it otherwise.
     SeenOtherwise(Vec<Step>),
+    /// Safe configurations were taken back, and something is not as before them.
+    LeftByEmergency(Vec<Step>),
     /// Stopped for a `safe` configuration.
     Interrupted(ConfigId),
     /// Overtaken by its own undo while it was queued.
@@ -295,6 +297,8 @@ impl Reason {
                 .help("see what its `holds` looks at; it is in force still, and watched again once it is applied anew"),
             Self::SeenOtherwise(_) => Finding::error(codes::SEEN_OTHERWISE, self.to_string())
                 .help("`davit drift` shows what differs, `davit recover --back` mends it, `--accept` takes it as it is"),
+            Self::LeftByEmergency(_) => Finding::error(codes::LEFT_BY_EMERGENCY, self.to_string())
+                .help("`davit recover --back` brings it to where it was, `--accept` takes it as it is"),
             Self::Interrupted(_) => Finding::error(codes::INTERRUPTED, self.to_string())
                 .help("ask again when the safe configuration is no longer needed"),
             Self::Overtaken => Finding::info(codes::OVERTAKEN, self.to_string()),
@@ -358,6 +362,7 @@ impl fmt::Display for Reason {
             Self::DoesNotStand(id) => write!(f, "applied, but what `{id}` stands for did not become true in time"),
             Self::StandsNoMore(id) => write!(f, "what `{id}` stands for is no longer so"),
             Self::SeenOtherwise(steps) => write!(f, "the platform shows otherwise: {}", list(steps)),
+            Self::LeftByEmergency(steps) => write!(f, "the emergency is over, and it is not as before it: {}", list(steps)),
             Self::Interrupted(by) => write!(f, "interrupted by the safe configuration `{by}`"),
             Self::Overtaken => f.write_str("overtaken by its own undo before it began"),
             Self::GivenUp => f.write_str("given up: its undo was asked for"),

@@ -194,6 +194,30 @@ fn what_is_reverted_is_heard_wherever_the_coordinator_is() {
     assert!(message.contains("`try.reverted` in root.tried"), "{message}");
 }
 
+/// What confirms may come while it is still being applied, here and in the running deployment; and what came before it was asked for does
+/// not count.
+#[test]
+fn what_is_confirmed_before_its_answer_is_not_taken_back() {
+    let configurations = "base = Configuration { create(\"a\", \"Drive\") },
+        try = Configuration { create(\"b\", \"Drive\"), confirm = { event = \"e_fine\", within = 1.0 } },";
+    // The event that it is asked for on, and the one that leads to where nobody hears that it was taken back.
+    let unheard = |asks: &str, leads: &str| {
+        let states = format!(
+            "{STATES} trying = state {{ entry = \"try\" }}, tried = state {{}},
+             trans {{ src = \"up\", tgt = \"trying\", events = {{ \"{asks}\" }} }},
+             trans {{ src = \"trying\", tgt = \"tried\", events = {{ \"{leads}\" }} }},
+             trans {{ src = \"trying\", tgt = \"up\", events = {{ \"try.failed\", \"try.broken\", \"try.reverted\" }} }},
+             trans {{ src = \"trying\", tgt = \"leaving\", events = {{ \"e_shutdown\" }}, effect = \"try.undo\" }},
+             trans {{ src = \"tried\", tgt = \"leaving\", events = {{ \"e_shutdown\" }}, effect = \"try.undo\" }},"
+        );
+        let said = Small::new(configurations, &states, "").check();
+        said.of("coord::reverted_unheard").iter().filter(|found| found["severity"] == "warning").count()
+    };
+    assert_eq!(unheard("e_try", "e_fine"), 0);
+    assert_eq!(unheard("e_fine", "try.ok"), 1);
+    assert_eq!(unheard("e_try", "try.ok"), 1);
+}
+
 /// After something broke, a safety event must be heard still.
 #[test]
 fn after_broken_safety_events_are_heard() {

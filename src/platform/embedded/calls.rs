@@ -1,7 +1,6 @@
 //! Steps that run a component's own code: hooks and operations, on workers or in the component's activity, under a
 //! deadline; and what becomes of those that come back too late.
 
-use super::steps::{Naps, closed};
 use super::under_way::{HookSettlement, What};
 use super::workers::Job;
 use super::{Inner, Outcome};
@@ -23,12 +22,14 @@ impl Inner {
         let may = |state| {
             if transition == Transition::Stop { state == RunState::Stopped } else { transition.allowed_in(state) }
         };
-        let mut inside = match CellGuard::idle(&**cell, safe, may) {
-            Ok(inside) => inside.sent(cell),
-            Err(why) => return Outcome::NotDone(closed(why, cell.name, transition.as_str())),
-        };
         let settled = Arc::new(HookSettlement::default());
         let _entered = self.under_way.enter(What::Hook(cell.name, transition, settled.clone()));
+        let enter = || Ok(CellGuard::idle(&**cell, safe, may));
+        let what = (cell.name, transition.as_str());
+        let mut inside = match self.when_free(what, deadline, || settled.is_withdrawn(), enter) {
+            Ok(inside) => inside.sent(cell),
+            Err(cause) => return Outcome::NotDone(cause),
+        };
         let (answer, answered) = self.clock.channel(1);
         let job: Job = {
             let (inner, cell, settled) = (self.own.clone(), cell.clone(), settled.clone());
@@ -191,32 +192,10 @@ impl Inner {
                 Ok(())
             }
             OperationExecutor::Worker => {
-                let inside = if safe || !cell.is_restless() {
-                    let refused = |why| closed(why, cell.name, "call an operation of");
-                    CellGuard::idle(&**cell, safe, |_| true).map_err(refused)?
-                } else {
-                    self.enter_rested(cell, &progress, deadline)?
-                };
+                let enter = || Ok(CellGuard::idle(&**cell, safe, |_| true));
+                let what = (cell.name, "call an operation of");
+                let inside = self.when_free(what, deadline, || progress.is_withdrawn(), enter)?;
                 self.operate_idle(inside, cell, CellRequest::Operation(*index, args), Responder(progress))
-            }
-        }
-    }
-
-    /// Enters a component that does not run when it has come to rest from a call that was given up; others may wait too.
-    fn enter_rested<'a>(
-        &self,
-        cell: &'a Cell,
-        progress: &CallProgress,
-        deadline: Time,
-    ) -> Result<CellGuard<'a>, Cause> {
-        let mut naps = Naps::default();
-        loop {
-            match CellGuard::idle(cell, false, |_| true) {
-                Ok(inside) => return Ok(inside),
-                Err(Closed::Busy) if progress.is_withdrawn() => return Err(Cause::Cancelled),
-                Err(Closed::Busy) if naps.take(&self.clock, deadline) => {}
-                Err(Closed::Busy) => return Err(Cause::Timeout),
-                Err(why) => return Err(closed(why, cell.name, "call an operation of")),
             }
         }
     }

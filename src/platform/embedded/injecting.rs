@@ -2,7 +2,6 @@
 //! wait for no call that was given up.
 
 use super::Inner;
-use super::steps::closed;
 use crate::model::{ComponentName, Ident, Injection, RunState, Value};
 use crate::runtime::activity::OperationJob;
 use crate::runtime::call::{CallProgress, Reply, Responder};
@@ -41,8 +40,9 @@ impl Inner {
                 activity.signal.notify();
             }
             None => {
-                let inside = CellGuard::idle(&*cell, true, |_| true);
-                let inside = inside.map_err(|why| closed(why, name, "inject anything into").to_string())?;
+                let enter = || Ok(CellGuard::idle(&*cell, true, |_| true));
+                let inside = self.when_free((name, "inject anything into"), deadline, || false, enter);
+                let inside = inside.map_err(|cause| cause.to_string())?;
                 self.operate_idle(inside, &cell, asked, call).map_err(|cause| cause.to_string())?;
             }
         }

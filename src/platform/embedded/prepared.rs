@@ -76,14 +76,16 @@ impl Prepared for EmbeddedPrepared {
                 outcome(registry.write_port(*slot, *index, value.or(prepared.as_ref()), now, false))
             }
             Act::Shift(transition) => {
-                if let Err(cause) = inner.shift(&mut registry, *slot, *transition, false) {
+                let cell = registry.entry(*slot).cell.clone();
+                let shifted = inner.shift(&mut registry, *slot, *transition, false);
+                drop(registry);
+                self.waited = cell.gate.is_busy();
+                if let Err(cause) = inner.shifted_when_free(shifted, (cell.name, *transition), deadline, false) {
                     return Outcome::NotDone(cause);
                 }
-                if *transition != Transition::Stop || !registry.entry(*slot).cell.gate.is_busy() {
+                if *transition != Transition::Stop || !cell.gate.is_busy() {
                     return Outcome::Done(None);
                 }
-                let cell = registry.entry(*slot).cell.clone();
-                drop(registry);
                 self.waited = true;
                 match inner.await_idle(&cell, deadline) {
                     Ok(()) => Outcome::Done(None),

@@ -52,9 +52,9 @@ impl StepSequence {
     }
 }
 
-/// Who carries a step out: a worker, as number so and so of a sequence, or whoever calls.
+/// Who carries a step out: a worker, as number so and so of a sequence, or whoever calls; and when it must be over.
 #[derive(Clone, Copy)]
-struct StepRunner<'a>(Option<(&'a StepSequence, usize)>);
+struct StepRunner<'a>(Option<(&'a StepSequence, usize)>, Time);
 
 impl StepRunner<'_> {
     /// The step has come to its end in time. Asked once, before its effect can be seen, so that nobody gives up what is
@@ -158,7 +158,9 @@ impl Inner {
             if !sequence.begin(i) {
                 return;
             }
-            let SequenceEnd::Ended(outcome) = self.make_or_drop(&timed.step, StepRunner(Some((sequence, i)))) else {
+            let SequenceEnd::Ended(outcome) =
+                self.make_or_drop(&timed.step, StepRunner(Some((sequence, i)), sequence.batch.deadline()))
+            else {
                 return;
             };
             sequence.batch.note(outcome, self.clock.now());
@@ -166,8 +168,8 @@ impl Inner {
     }
 
     /// Carries out a step of a type that promises to be made and dropped at once, in the caller's thread.
-    pub(super) fn at_once(&self, step: &Step) -> Outcome {
-        match self.make_or_drop(step, StepRunner(None)) {
+    pub(super) fn at_once(&self, step: &Step, deadline: Time) -> Outcome {
+        match self.make_or_drop(step, StepRunner(None, deadline)) {
             SequenceEnd::Ended(outcome) => outcome,
             SequenceEnd::Late => Outcome::Unknown(Cause::Timeout),
         }
@@ -268,22 +270,27 @@ impl Inner {
     }
 
     fn destroy(&self, name: ComponentName, place: StepRunner) -> SequenceEnd {
-        let mut registry = lock(&self.registry);
-        let taken = registry.find(name).and_then(|slot| {
-            let cell = registry.entry(slot).cell.clone();
-            if cell.gate.is_quarantined() {
-                return Err(Cause::Quarantined);
-            }
-            registry.is_unconnected(slot)?;
-            let may = |state| matches!(state, RunState::Unconfigured | RunState::Faulted);
-            let mut inside =
-                CellGuard::idle(&*cell, false, may).map_err(|why| super::steps::closed(why, name, "destroy"))?;
-            let body = inside.take();
-            // Nobody enters it again, whoever still knows it.
-            inside.close();
-            Ok((body, registry.remove(slot)))
-        });
-        drop(registry);
+        let taken = self.when_free(
+            (name, "destroy"),
+            place.1,
+            || false,
+            || {
+                let mut registry = lock(&self.registry);
+                let slot = registry.find(name)?;
+                let cell = registry.entry(slot).cell.clone();
+                if cell.gate.is_quarantined() {
+                    return Err(Cause::Quarantined);
+                }
+                registry.is_unconnected(slot)?;
+                let may = |state| matches!(state, RunState::Unconfigured | RunState::Faulted);
+                Ok(CellGuard::idle(&*cell, false, may).map(|mut inside| {
+                    let body = inside.take();
+                    // Nobody enters it again, whoever still knows it.
+                    inside.close();
+                    (body, registry.remove(slot))
+                }))
+            },
+        );
         let taken = match taken {
             Ok(taken) => taken,
             Err(cause) => return self.not_done(name, cause, place),

@@ -1,6 +1,7 @@
 //! Carrying out steps: the immediate ones here, the others by [`step_sequence`](super::step_sequence) and [`calls`](super::calls).
 
 use super::registry::Registry;
+use super::under_way::{HookSettlement, What};
 use super::{Inner, Outcome};
 use crate::model::{ComponentName, Policy, RunState, Step, Transition};
 use crate::platform::{Cause, PlatformEvent, StepBatch, TimedStep};
@@ -47,12 +48,24 @@ impl Naps {
     }
 }
 
-pub(super) fn closed(closed: Closed, name: ComponentName, what: &str) -> Cause {
-    match closed {
+/// What came of going in at a component's gate.
+pub(super) type Entered<T> = Result<Result<T, Closed>, Cause>;
+
+/// What is to be done with which component.
+type Errand<'a> = (ComponentName, &'a str);
+
+/// Whether somebody else is inside, who will leave.
+fn is_busy<T>(entered: &Entered<T>) -> bool {
+    matches!(entered, Ok(Err(Closed::Busy)))
+}
+
+/// Who is still inside was waited for.
+fn opened<T>(entered: Entered<T>, (name, what): Errand) -> Result<T, Cause> {
+    entered?.map_err(|why| match why {
         Closed::State(state) => Cause::Refused(format!("cannot {what} `{name}` while it is {state}")),
-        Closed::Busy => Cause::Refused(format!("another call of `{name}` is under way")),
+        Closed::Busy => Cause::Timeout,
         Closed::Quarantined => Cause::Quarantined,
-    }
+    })
 }
 
 impl Inner {
@@ -60,8 +73,10 @@ impl Inner {
     pub(super) fn execute(&self, step: &Step, deadline: Time, safe: bool) -> Outcome {
         match step {
             Step::State { component, transition } => self.transition(*component, *transition, deadline, safe),
-            Step::Create { ty, .. } if self.kinds.get(ty).is_none_or(|kind| kind.is_immediate()) => self.at_once(step),
-            Step::Destroy { component } if self.is_dropped_at_once(*component) => self.at_once(step),
+            Step::Create { ty, .. } if self.kinds.get(ty).is_none_or(|kind| kind.is_immediate()) => {
+                self.at_once(step, deadline)
+            }
+            Step::Destroy { component } if self.is_dropped_at_once(*component) => self.at_once(step, deadline),
             Step::Create { .. } | Step::Destroy { .. } => {
                 let alone = TimedStep { step: step.clone(), patience: Duration::MAX, until: deadline };
                 let batch = StepBatch::new(self.clock.clone(), vec![alone]);
@@ -102,7 +117,9 @@ impl Inner {
             let cell = registry.entry(slot).cell.clone();
             let hook = cell.kind.has_hook(transition);
             if transition == Transition::Stop || !hook {
-                if let Err(cause) = self.shift(&mut registry, slot, transition, safe) {
+                let shifted = self.shift(&mut registry, slot, transition, safe);
+                drop(registry);
+                if let Err(cause) = self.shifted_when_free(shifted, (name, transition), deadline, safe) {
                     return Outcome::NotDone(cause);
                 }
                 if !hook && !cell.gate.is_busy() {
@@ -117,14 +134,61 @@ impl Inner {
         if cell.kind.has_hook(transition) { self.hook(&cell, transition, deadline, safe) } else { Outcome::Done(None) }
     }
 
-    /// Moves a component to another state, without its hook and without waiting.
-    pub(super) fn shift(
+    /// Does what a component's gate must let in, as soon as nobody is inside: an injected delay holds it for a while, and so
+    /// does a call that was given up.
+    ///
+    /// # Errors
+    /// It was withdrawn, or the deadline came, while somebody was inside; or the gate stays closed.
+    pub(super) fn when_free<T>(
         &self,
-        registry: &mut Registry,
-        slot: u32,
-        transition: Transition,
+        errand: Errand,
+        deadline: Time,
+        withdrawn: impl Fn() -> bool,
+        mut enter: impl FnMut() -> Entered<T>,
+    ) -> Result<T, Cause> {
+        let mut naps = Naps::default();
+        loop {
+            let entered = enter();
+            if !is_busy(&entered) {
+                return opened(entered, errand);
+            }
+            if withdrawn() {
+                return Err(Cause::Cancelled);
+            }
+            if !naps.take(&self.clock, deadline) {
+                return Err(Cause::Timeout);
+            }
+        }
+    }
+
+    /// What came of a [`shift`](Self::shift), which is tried again until nobody is inside the component.
+    pub(super) fn shifted_when_free(
+        &self,
+        shifted: Entered<()>,
+        (name, transition): (ComponentName, Transition),
+        deadline: Time,
         safe: bool,
     ) -> Result<(), Cause> {
+        let errand = (name, transition.as_str());
+        if !is_busy(&shifted) {
+            return opened(shifted, errand);
+        }
+        let settled = Arc::new(HookSettlement::default());
+        let _entered = self.under_way.enter(What::Hook(name, transition, settled.clone()));
+        self.when_free(
+            errand,
+            deadline,
+            || settled.is_withdrawn(),
+            || {
+                let mut registry = lock(&self.registry);
+                let slot = registry.find(name)?;
+                self.shift(&mut registry, slot, transition, safe)
+            },
+        )
+    }
+
+    /// Moves a component to another state, without its hook and without waiting.
+    pub(super) fn shift(&self, registry: &mut Registry, slot: u32, transition: Transition, safe: bool) -> Entered<()> {
         if transition == Transition::Start {
             registry.enlist(slot, &self.clock)?;
         }
@@ -132,13 +196,15 @@ impl Inner {
         if transition == Transition::Start && cell.state() == RunState::Stopped {
             cell.restart();
         }
-        cell.gate.shift(transition, safe).map_err(|why| closed(why, cell.name, transition.as_str()))?;
+        if let Err(why) = cell.gate.shift(transition, safe) {
+            return Ok(Err(why));
+        }
         match transition {
             Transition::Start => registry.activity_of(slot).activity.started(cell),
             Transition::Stop => registry.activity_of(slot).activity.stopped(cell),
             Transition::Configure | Transition::Cleanup => {}
         }
-        Ok(())
+        Ok(Ok(()))
     }
 
     /// Waits until the update under way of a component that has been stopped has ended.

@@ -40,6 +40,10 @@ impl HookSettlement {
         self.move_on(Self::QUEUED, Self::WITHDRAWN)
     }
 
+    pub(super) fn is_withdrawn(&self) -> bool {
+        self.0.load(Ordering::Acquire) == Self::WITHDRAWN
+    }
+
     pub(super) fn first(&self) -> bool {
         self.move_on(Self::BEGUN, Self::SETTLED)
     }
