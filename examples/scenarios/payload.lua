@@ -69,3 +69,21 @@ for _, mode in ipairs(MODES) do
   expect{ name = mode.name .. ": parked with it: fastest joint", value = parked.joint, max = 1.571, unit = "rad/s" }
   shutdown()
 end
+
+-- What is stopped and too heavy for its drives sinks, whatever they give: that is told, and told again.
+deploy("../../deployments/youbot_coupling.yaml")
+for _, robot in ipairs{ "left", "right" } do wait_state(robot .. ":copying", 20) end
+raise("left/e_estop")
+wait(1)
+local began = now()
+local heavy = seen("too_heavy", 2, function() set("World.robot1_mass_scale", 2.0, { force = true, within = 1 }) end)
+local told
+for _, entry in ipairs(log{ since = began }) do
+  if entry.event == "left/e_arm_gives_way" then told = told or entry.at - began end
+end
+figure{ name = "too heavy: sinks by", value = 1000 * heavy.sunk, unit = "mm" }
+expect{ name = "too heavy: told after", value = told or 99, max = 1, unit = "s" }
+expect{ name = "too heavy: torque in 1 ms", value = heavy.torque, max = 0.5, unit = "N m" }
+set("World.robot1_mass_scale", 1.0, { force = true, within = 1 })
+wait(1)
+shutdown()

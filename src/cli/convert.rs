@@ -5,10 +5,10 @@ use super::input::{Parameters, is_deployment, unread};
 use super::{CommandContext, CommandFailure, CommandResult, Run, write_output};
 use crate::diagnostics::Language;
 use crate::lang::{self, LoadOptions, Sources};
-use crate::model::codes::{CONVERT_FUNCTIONS, CONVERT_SUBSYSTEMS};
+use crate::model::codes::{CLI_OVERWRITES, CONVERT_FUNCTIONS, CONVERT_SUBSYSTEMS};
 use crate::model::{Finding, Findings, Statechart};
 use crate::statechart::compile;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Write the same model in another language.
 ///
@@ -29,6 +29,9 @@ pub struct Args {
     /// Write to this file (of a deployment: into this directory) instead of printing.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
+    /// Of a deployment: write over files that are there with another text.
+    #[arg(long, requires = "output")]
+    force: bool,
     /// Stand in for the host of a coordinator with functions: run this Lua file before it. May be given again.
     #[arg(long, value_name = "FILE")]
     host: Vec<PathBuf>,
@@ -75,21 +78,11 @@ impl Run for Args {
                 let finding = Finding::info(CONVERT_FUNCTIONS, message).help(help);
                 context.out.findings(&[finding], &loaded.sources);
             }
-            if let Some(directory) = &self.output {
-                // Why it cannot be made is said of the first file that cannot be written.
-                _ = std::fs::create_dir_all(directory);
-            }
-            for (name, text) in lang::print::deployment(&deployment, language) {
-                match &self.output {
-                    Some(directory) => {
-                        let path = directory.join(&name);
-                        // Files of a coordinator that is kept lie in folders.
-                        if let Some(folder) = path.parent().filter(|folder| *folder != directory) {
-                            _ = std::fs::create_dir_all(folder);
-                        }
-                        write_output(context, Some(&path), &text)?;
-                    }
-                    None => {
+            let texts = lang::print::deployment(&deployment, language);
+            match &self.output {
+                Some(directory) => write_all(context, directory, &texts, self.force)?,
+                None => {
+                    for (name, text) in texts {
                         let comment = if name.ends_with(".lua") { "--" } else { "#" };
                         context.out.text(format!("{comment} {name}\n{text}\n"));
                     }
@@ -110,6 +103,43 @@ impl Run for Args {
         write_output(context, self.output.as_deref(), &text)?;
         Ok(Exit::Done)
     }
+}
+
+/// Writes files of these names into a directory. Nobody has chosen them: unless it is forced, none is written over with another text.
+fn write_all(
+    context: &CommandContext,
+    directory: &Path,
+    texts: &[(String, String)],
+    force: bool,
+) -> Result<(), CommandFailure> {
+    let other = |(name, text): &&(String, String)| {
+        let path = directory.join(name);
+        path.exists() && std::fs::read(path).is_ok_and(|there| there != text.as_bytes())
+    };
+    let others: Vec<String> = texts.iter().filter(other).map(|(name, _)| format!("`{name}`")).collect();
+    if !force && !others.is_empty() {
+        let (is, them) = if others.len() == 1 { ("is", "it") } else { ("are", "them") };
+        return Err(CommandFailure::usage(
+            CLI_OVERWRITES,
+            format!(
+                "{}: {} {is} there, with another text; nothing was written",
+                directory.display(),
+                others.join(", ")
+            ),
+            format!("name another directory, or write over {them} with `--force`"),
+        ));
+    }
+    // Why it cannot be made is said of the first file that cannot be written.
+    _ = std::fs::create_dir_all(directory);
+    for (name, text) in texts {
+        let path = directory.join(name);
+        // Files of a coordinator that is kept lie in folders.
+        if let Some(folder) = path.parent().filter(|folder| *folder != directory) {
+            _ = std::fs::create_dir_all(folder);
+        }
+        write_output(context, Some(&path), text)?;
+    }
+    Ok(())
 }
 
 /// What is wrong with a coordinator by itself: a transition that leads nowhere cannot be written in each language.

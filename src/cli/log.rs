@@ -219,9 +219,10 @@ pub fn line(out: &Output, entry: &Json, steps: bool) -> String {
         "injected" => format!("inject     {}: {}", text(&entry["component"]), text(&entry["fault"])),
         "returned" => format!("returned   {}", text(&entry["component"])),
         "missed" => format!(
-            "{}     not shown: {}, which came faster than they were read",
+            "{}     not shown: {}, which {}",
             out.paint(Style::Care, "missed"),
-            count(&entry["entries"], "entry")
+            count(&entry["entries"], "entry"),
+            if entry["unreadable"] == true { "cannot be read in the file" } else { "came faster than they were read" }
         ),
         "dropped" => format!(
             "{}    {}: the coordinator does not keep up",

@@ -109,7 +109,9 @@ fn own(out: &Output, status: &Json, part: &FilePart<'_>, known: bool) -> String 
             _ => one.clone(),
         };
         let residual: Vec<Json> = part.residual.iter().map(|one| told(one)).collect();
-        said += &format!("{}\n{}", out.paint(Style::Bad, "what remains of what broke it"), listed(&residual));
+        let broken = status["phase"] == "broken";
+        let title = if broken { "what remains of what broke it" } else { "what is not as it should be" };
+        said += &format!("{}\n{}", out.paint(Style::Bad, title), listed(&residual));
     }
     said + &faults(out, part)
 }

@@ -64,12 +64,20 @@ impl Run for Args {
             None if self.json => out.json(&catalogue.iter().map(|ty| view(ty)).collect::<Vec<_>>()),
             None => list(out, &catalogue),
             Some(name) => {
-                let mut by_last = catalogue.iter().filter(|ty| ty.name.as_str().rsplit('.').next() == Some(&name));
-                // The name alone will do while only one library has it.
+                let ends = |ty: &ComponentType| {
+                    let whole = ty.name.as_str();
+                    ['.', '/'].into_iter().any(|before| whole.rsplit(before).next() == Some(&name))
+                };
+                let mut by_last = catalogue.iter().filter(|ty| ends(ty));
+                // The name alone will do while only one library, or subsystem, has it.
                 let only = by_last.next().filter(|_| by_last.next().is_none());
                 let Some(ty) = catalogue.iter().find(|ty| ty.name.as_str() == name).or(only) else {
                     let of_library = |ty: &ComponentType| ty.name.as_str().split('.').next() == Some(&name);
-                    let help = if name == MONITORS_TYPE {
+                    let several = catalogue.iter().filter(|ty| ends(ty)).map(|ty| format!("`{}`", ty.name));
+                    let several: Vec<String> = several.collect();
+                    let help = if !several.is_empty() {
+                        format!("several have one: {}", several.join(", "))
+                    } else if name == MONITORS_TYPE {
                         format!("what it has are a deployment's own monitors: `davit types FILE {MONITORS_TYPE}`")
                     } else {
                         match catalogue.iter().any(|ty| of_library(ty)) {

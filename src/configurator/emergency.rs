@@ -20,18 +20,14 @@ pub struct BeforeEmergency {
 }
 
 impl BeforeEmergency {
-    /// The picture of that time with what is in force now: without the newest frames that are not any more, and with those that came. None:
-    /// one from between is gone, or what came cannot be thought there without all that has happened.
+    /// The picture of that time without the newest frames that are not in force any more. None: something came since. What that has found
+    /// as it wants it, it has not done, and keeps all the same: nothing is known of what is to be there.
     fn wanted(self, stack: &Stack) -> Option<System> {
         let Self { frames, mut system } = self;
         let now = stack.frames();
-        let same = now.iter().zip(&frames).take_while(|(now, before)| now.id == before.id).count();
-        let (gone, came) = (&frames[same..], &now[same..]);
-        if gone.iter().any(|gone| came.iter().any(|came| came.id == gone.id)) {
-            return None;
-        }
+        let is_same = now.len() <= frames.len() && now.iter().zip(&frames).all(|(now, before)| now.id == before.id);
         let mut go = |step: &Step| step::apply(step, &mut system).ok().map(drop);
-        for frame in gone.iter().rev() {
+        for frame in frames.get(now.len()..).filter(|_| is_same)?.iter().rev() {
             match &frame.inverse {
                 Inverse::Steps(steps) => {
                     steps.iter().rev().flat_map(|planned| planned.undo.steps()).try_for_each(&mut go)
@@ -39,7 +35,6 @@ impl BeforeEmergency {
                 Inverse::List(items) => items.iter().try_for_each(|item| go(&item.step)),
             }?;
         }
-        came.iter().flat_map(|frame| frame.steps()).try_for_each(|planned| go(&planned.step))?;
         Some(system)
     }
 }

@@ -51,7 +51,12 @@ impl Engine {
             let all = stopping || self.leaving.is_some();
             let safe = |id: ConfigId| self.given.configurations.get(&id).is_some_and(|c| c.safe);
             let refused = |request: &Request| {
-                let safe = matches!(request.ask, Ask::Apply(id) if safe(id));
+                // While it is led down people let go of what they have made safe; once it is stopped nobody does.
+                let safe = match request.ask {
+                    Ask::Apply(id) => safe(id),
+                    Ask::UndoOf(id) => safe(id) && !stopping,
+                    _ => false,
+                };
                 let asked = request.why == Why::Asked && request.requester == Requester::Operator;
                 asked && !safe && (all || led(request.ask)) && (stopping || !request.force)
             };

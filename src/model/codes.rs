@@ -827,6 +827,9 @@ codes! {
     CLI_BAD_SET = "cli::bad_set", "`--set` gives no parameter a value",
         "Parameters of the files are given as `--set NAME=VALUE`; the name may have dots, `--set gains.k=2.5`. They \
          override what the deployment says under `with:`. Without an equals sign there is nothing to give.";
+    CLI_OVERWRITES = "cli::overwrites", "files are there that would be written over",
+        "The names of what is written into a folder are the program's own, and a file of one of them is there with another text. \
+         It may be another deployment's, or somebody's own: nothing was written. Name another folder, or say `--force`.";
     CLI_UNWRITABLE = "cli::unwritable", "the output cannot be written",
         "`-o FILE` names a file that cannot be created or written: the directory is missing, it is a directory itself, or \
          permission is denied. Nothing was written. Name another file, or leave `-o` out to print to the terminal. Or what \

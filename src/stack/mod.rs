@@ -53,6 +53,7 @@ pub use share::{HandOver, calls, components, is_kept, shares, staying};
 pub use stands::{is_stood_down, running_for};
 pub use still::Beside;
 pub use there::beside_what_is_interrupted;
+pub use void::TakenAway;
 pub use work::{Along, Op, Part, Planned, places, transaction};
 pub use world::{Broken, SafeWrites, World};
 
@@ -204,7 +205,7 @@ pub struct Edits {
     /// Those of something safe that the one which comes takes over, with all that they take back.
     pub over: SmallVec<[FrameId; 1]>,
     /// Components that their own file takes away: what frames of others did to them is void.
-    pub gone: Vec<ComponentName>,
+    pub gone: Vec<void::TakenAway>,
     /// A frame that comes; its number is given when it does.
     pub push: Option<Arc<Frame>>,
     /// That frame waits for its confirmation: until then it is not squashed, since it may have to be taken back alone.
@@ -387,7 +388,7 @@ impl Stack {
                 pushed.iter_mut().filter(|id| **id == Some(popped)).for_each(|id| *id = None);
             }
             if !gone.is_empty() {
-                self.take_out(&|frame, of| gone.contains(&of) && void::is_foreign(frame, of), &busy);
+                self.take_out(&|frame, of| void::is_void(gone, frame, of), &busy);
             }
             if push.is_none() {
                 pushed.push(None);

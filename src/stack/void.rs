@@ -1,11 +1,12 @@
 //! What becomes of what a file did to components of a subsystem (semantics: *Composition*): it is void once the subsystem has taken
 //! them away, and until then only a connection is in that one's way.
 
-use super::{Frame, Inverse};
+use super::{Frame, FrameId, Inverse};
 use crate::model::{ComponentName, MemberRef, Step};
 use crate::plan::footprint::{Access, Footprint, Slot, Touch};
 use crate::plan::undo::{DraftStep, absolute};
 use crate::plan::{PlannedStep, SavedValue};
+use crate::system::View;
 use crate::system::touch::components;
 use rustc_hash::FxHashSet;
 use smallvec::SmallVec;
@@ -64,6 +65,21 @@ fn left_connected(frame: &Frame, from: MemberRef, to: MemberRef) -> Option<bool>
     }
 }
 
+/// A component that its own file takes away.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct TakenAway {
+    /// Which.
+    pub component: ComponentName,
+    /// The one that this frame had put in the place of another one, which is there again, with all that was done to that before.
+    pub from: Option<FrameId>,
+}
+
+/// Whether what a frame of another file did to a component is void with these.
+pub(super) fn is_void(gone: &[TakenAway], frame: &Frame, component: ComponentName) -> bool {
+    let own = |gone: &TakenAway| gone.component == component && gone.from.is_none_or(|from| frame.id > from);
+    gone.iter().any(own) && is_foreign(frame, component)
+}
+
 /// Whether a frame is about a component, and of another file than that.
 pub(super) fn is_foreign(frame: &Frame, component: ComponentName) -> bool {
     let about = |touch: &Touch| {
@@ -93,13 +109,29 @@ pub(super) fn touched_from_outside(
     components.filter(touched).collect()
 }
 
-/// The components of its own file that a frame makes or takes away.
-pub(super) fn made_by(frame: &Frame) -> impl Iterator<Item = ComponentName> + '_ {
+/// What the undo of a frame takes away: what it had made, also where what was there before is back. What was done to that before is
+/// as it was. Of what is left of a frame it is not known.
+pub(super) fn taken_away_with(frame: &Frame, after: &impl View) -> Vec<TakenAway> {
     let made = |touch: &Touch| match touch.slot {
         Slot::Component(of) if touch.access != Access::Need && frame.is_of_file(of.prefix()) => Some(of),
         _ => None,
     };
-    frame.footprint.touches.iter().filter_map(made)
+    let taken_away = |component: ComponentName| {
+        let is_there = after.component(component).is_some();
+        let from = is_there.then_some(frame.id);
+        (!frame.partial || !is_there).then_some(TakenAway { component, from })
+    };
+    frame.footprint.touches.iter().filter_map(made).filter_map(taken_away).collect()
+}
+
+/// What these steps take away. Where they put another component in the place of one it is there all the same, with its connections.
+pub(super) fn taken_away_by(steps: &[PlannedStep]) -> Vec<TakenAway> {
+    let is_made = |of| steps.iter().any(|p| matches!(p.step, Step::Create { component, .. } if component == of));
+    let taken_away = |planned: &PlannedStep| match planned.step {
+        Step::Destroy { component } if !is_made(component) => Some(TakenAway { component, from: None }),
+        _ => None,
+    };
+    steps.iter().filter_map(taken_away).collect()
 }
 
 /// Takes what is void out of frames: what they did to components that `gone` says are gone. One with nothing left goes. Whether there was

@@ -2,7 +2,10 @@
 
 use super::pushes::PlannedPush;
 use super::share::{self, HandOver};
-use super::{Edits, Frame, FrameId, Inverse, Pile, PushesOf, Requester, Scope, Stack, net, newest, squash, void};
+use super::{
+    Edits, Frame, FrameId, Inverse, Pile, PushesOf, Requester, Scope, Stack, net, newest, squash,
+    void::{self, TakenAway},
+};
 use crate::model::finding::count;
 use crate::model::{ComponentName, ConfigId, Configuration, Finding, Findings, MemberRef, OnFailure, Step, codes};
 use crate::plan::undo::{DraftStep, Script, undo};
@@ -298,11 +301,7 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
         taken_back.map_err(|found| drifted(&found))?;
         share::hand_over(&mut self.frames, &hand, &|id| id);
         self.frames.remove(at);
-        // What it had made is away, also where what was there before is back; of what is left of one that is not known.
-        let view = self.script.view();
-        let away = |of: &ComponentName| !frame.partial || view.component(*of).is_none();
-        let gone: Vec<ComponentName> = void::made_by(&frame).filter(away).collect();
-        self.is_taken_away(gone.into_iter(), edits);
+        self.is_taken_away(void::taken_away_with(&frame, self.script.view()), edits);
         // A frame that this very transaction pushes and pops leaves no trace.
         if let Some(i) = self.pushed.iter().position(|id| *id == frame.id) {
             self.pushed.remove(i);
@@ -314,11 +313,12 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
     }
 
     /// Their own file takes components away: what frames of others did to them is void from now on.
-    fn is_taken_away(&mut self, gone: impl Iterator<Item = ComponentName>, edits: &mut Edits) {
-        let mut gone: Vec<ComponentName> = void::touched_from_outside(&self.frames, gone);
+    fn is_taken_away(&mut self, mut gone: Vec<TakenAway>, edits: &mut Edits) {
+        let touched = void::touched_from_outside(&self.frames, gone.iter().map(|gone| gone.component));
+        gone.retain(|gone| touched.contains(&gone.component));
         if !gone.is_empty() {
             gone.sort_unstable();
-            void::take_out(&mut self.frames, &|frame, of| gone.contains(&of) && void::is_foreign(frame, of));
+            void::take_out(&mut self.frames, &|frame, of| void::is_void(&gone, frame, of));
             edits.gone.extend(gone);
         }
     }
@@ -369,11 +369,7 @@ impl<'o, 's, 'k> Work<'o, 's, 'k> {
         });
         let PlannedPush { steps, footprint, saved, floor, warnings } = (*planned).as_ref().map_err(Refusal::clone)?;
         self.warnings.extend(warnings.iter().cloned());
-        let destroyed = steps.iter().filter_map(|planned| match planned.step {
-            Step::Destroy { component } => Some(component),
-            _ => None,
-        });
-        self.is_taken_away(destroyed, edits);
+        self.is_taken_away(void::taken_away_by(steps), edits);
         if first {
             self.lone = Some(steps.clone());
         } else {

@@ -600,3 +600,55 @@ fn what_only_a_replacement_drives_or_connects_is_known() {
     let found = demo.run(&["check", "deployment.yaml", "--json"]).json();
     assert_eq!(found["findings"].as_array().unwrap().iter().filter(of).count(), 2);
 }
+
+/// What a parent has connected to a component stands when that is exchanged in its own file: it is connected to the new one, and to the old one
+/// again, and is in force all the time. What was done to the new one alone is void with that.
+#[test]
+fn what_a_parent_has_done_stays_when_its_subsystem_exchanges_a_component() {
+    for (then, left) in [
+        ("undo('left/swap', { force = true })", "left/make right/make left/run right/run join"),
+        ("apply('left/swap', { force = true })", "left/make right/make left/run right/run join left/swap left/swap"),
+    ] {
+        let demo = Demo::new();
+        for file in std::fs::read_dir(format!("{}/examples/pair", env!("CARGO_MANIFEST_DIR"))).expect("the folder") {
+            let file = file.expect("one of it");
+            std::fs::copy(file.path(), demo.path(&file.file_name().to_string_lossy())).expect("copied");
+        }
+        let run = "  run = Configuration";
+        demo.replace(
+            "robot_configurations.lua",
+            run,
+            &format!("  swap = Configuration {{ replace(\"Drive\", \"Drive\") }},\n{run}"),
+        );
+        demo.write(
+            "s.lua",
+            &format!(
+                "local function names() local all = {{}} for _, frame in ipairs(stack()) do all[#all + 1] = frame.configuration end
+                   table.sort(all) return table.concat(all, ' ') .. ', ' .. #system().connections .. ' ' .. #drift() end
+                 deploy('pair.yaml') say('before ' .. names())
+                 apply('left/swap', {{ force = true }}) wait_answer('left/swap.ok', 2) say('swapped ' .. names())
+                 {then} wait(1) say('then ' .. names()) shutdown()"
+            ),
+        );
+        let ran = demo.run(&["run", "s.lua", "--clock", "simulated", "--quiet"]);
+        let sorted = |names: &str| {
+            let mut all: Vec<&str> = names.split(' ').filter(|name| !name.is_empty()).collect();
+            all.sort_unstable();
+            all.join(" ")
+        };
+        let base = "left/make right/make left/run right/run join";
+        let expected = [
+            format!("before {}, 2 0", sorted(base)),
+            format!("swapped {}, 2 0", sorted(&format!("{base} left/swap"))),
+            format!("then {}, 2 0", sorted(left)),
+        ];
+        let said: Vec<&str> = ran.out.lines().filter(|line| line.contains(", ")).take(3).collect();
+        assert_eq!(
+            (said, ran.code),
+            (expected.iter().map(String::as_str).collect(), 0),
+            "{then}: {}{}",
+            ran.out,
+            ran.err
+        );
+    }
+}

@@ -16,6 +16,7 @@ mod declared;
 mod demo;
 mod drawn;
 mod emergency;
+mod emergency_over;
 mod endless;
 mod endurance;
 mod explored;

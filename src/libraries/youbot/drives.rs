@@ -105,6 +105,10 @@ const SPEED_GAIN: [f64; JOINTS] = [24.0, 24.0, 12.0, 4.0, 1.5];
 /// A step back inside the soft limit before its exit is reported, as a share of the range.
 const SOFT_LIMIT_HYSTERESIS: f64 = 0.01;
 
+/// An arm that is held gives way when a joint is farther than this from where its drive holds it, in rad: it has been giving all that it
+/// has for long.
+const GIVES_WAY: f64 = 0.05;
+
 /// As far from a stop an arm that sinks onto it is not dropped, in rad.
 const NEAR_STOP: f64 = 0.05;
 
@@ -197,6 +201,12 @@ impl Drives {
     /// How the arm differs from what it is meant to be, as the last motion from or onto the stops has told.
     pub fn identified(&self) -> Option<ArmScales> {
         self.identified
+    }
+
+    /// The drives hold the arm with all that they have, and it goes elsewhere: it is too heavy for them, or somebody is stronger.
+    pub fn gives_way(&self) -> bool {
+        let held = self.mode == DriveMode::Positioning && !self.busy() && self.settles == 0.0;
+        held && (0..JOINTS).any(|i| (self.target[i] - self.measured.q[i]).abs() > GIVES_WAY)
     }
 
     /// What they do.

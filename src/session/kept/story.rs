@@ -4,13 +4,13 @@ use super::log_file;
 use super::reading::{end_of, opened};
 use super::rotating::older;
 use crate::limits;
-use serde_json::Value as Json;
+use serde_json::{Value as Json, json};
 use std::collections::BTreeMap;
 use std::io;
 use std::path::Path;
 
-/// The entries of the last life of that name, oldest first, as far as they are kept. What cannot be read (the last line of
-/// one that was killed) is left out.
+/// The entries of the last life of that name, oldest first, as far as they are kept. Where lines cannot be read (the last one of
+/// who was killed, what a disk has lost) stands how many.
 ///
 /// # Errors
 /// When the log cannot be read at all.
@@ -24,7 +24,32 @@ pub fn entries(name: &str) -> io::Result<Vec<Json>> {
     // From the last beginning on: what is before belongs to another life.
     let lines: Vec<&str> = text.lines().collect();
     let begins = lines.iter().rposition(|line| line.contains(r#""what":"began""#)).unwrap_or_default();
-    Ok(lines[begins..].iter().filter_map(|line| serde_json::from_str(line).ok()).filter(Json::is_object).collect())
+    Ok(read_lines(&lines[begins..]))
+}
+
+fn read_lines(lines: &[&str]) -> Vec<Json> {
+    let mut entries: Vec<Json> = Vec::new();
+    let mut unreadable = 0;
+    for line in lines.iter().filter(|line| !line.is_empty()) {
+        let entry = serde_json::from_str(line).ok().filter(|entry: &Json| entry["what"].is_string());
+        match entry {
+            Some(entry) => {
+                entries.extend(missing(&entries, std::mem::take(&mut unreadable)));
+                entries.push(entry);
+            }
+            // What is read from its end on may begin in the middle of a line.
+            None if entries.is_empty() => {}
+            None => unreadable += 1,
+        }
+    }
+    entries.extend(missing(&entries, unreadable));
+    entries
+}
+
+/// That lines could not be read, behind these.
+fn missing(before: &[Json], lines: usize) -> Option<Json> {
+    let at = before.last().and_then(|entry| entry["at"].as_f64()).unwrap_or_default();
+    (lines > 0).then(|| json!({ "at": at, "what": "missed", "entries": lines, "unreadable": true }))
 }
 
 /// How far it was, as told by its entries.
@@ -92,7 +117,7 @@ impl Story {
 
     /// What stands at the beginning of a new file, so that the older one is not needed to know this.
     pub fn head(&self) -> Json {
-        serde_json::json!({
+        json!({
             "at": self.at, "what": "goes_on", "phase": self.phase, "states": self.states, "outstanding": self.outstanding,
             "faults": self.faults, "incomplete": self.incomplete
         })
@@ -107,7 +132,6 @@ impl Story {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use serde_json::json;
 
     #[test]
     fn a_new_file_knows_what_the_older_one_did() {
@@ -127,6 +151,19 @@ mod tests {
         assert_eq!(story.faults, BTreeMap::from([("a".to_owned(), "torn".to_owned())]));
         assert_eq!(Story::of(&[story.head()]), story);
         assert_eq!(Story::of(&[story.head(), entries[0].clone()]), Story::default(), "another life");
+        let lines = [
+            r#"alf a line"#,
+            r#"{"at":1.0,"what":"began"}"#,
+            "",
+            "\0\0\0",
+            r#"{"at":2.0,"what":"pha"#,
+            r#"{"at":3.0,"what":"phase"}"#,
+            r#"{"at":4"#,
+        ];
+        let read = read_lines(&lines);
+        let told: Vec<_> =
+            read.iter().map(|entry| (entry["at"].as_f64().unwrap(), entry["entries"].as_u64())).collect();
+        assert_eq!(told, [(1.0, None), (1.0, Some(2)), (3.0, None), (3.0, Some(1))]);
         let missed = json!({"at": 0.6, "what": "missed", "entries": 3});
         let with_hole = Story::of(&[&entries[..], std::slice::from_ref(&missed)].concat());
         assert!(with_hole.incomplete && Story::of(&[with_hole.head()]).incomplete);

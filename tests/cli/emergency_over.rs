@@ -1,0 +1,236 @@
+//! When an emergency is over it is as it was before, where the same is in force: several safe configurations at one instant, let go of by something
+//! ordinary, pressed again while one of their steps is out, with what else failed meanwhile. What would move is told and left to who recovers.
+
+use crate::demo::Demo;
+
+const DEPLOYMENT: &str = "davit: 1
+name: over
+platform: simulated
+types:
+  Motor:
+    actuator: true
+    moves: [start]
+    properties: { limit: { type: float, default: 0.5 } }
+    ports: { speed: { direction: in, type: float }, ref: { direction: in, type: float } }
+    operations:
+      clamp: { effect: { undo: unclamp } }
+      unclamp: { effect: { undo: clamp } }
+      brake: { effect: { undo: release } }
+      release: { effect: { undo: brake } }
+  Lamp: { ports: { o: { direction: out, type: float } } }
+configurations: [configurations.yaml]
+coordinator: coordinator.yaml
+safety: [e_stop, e_halt]
+deploy: { event: e_start, up: up.idle, failed: [failed], within_s: 5 }
+shutdown: { event: e_end, down: off, within_s: 5 }
+";
+
+const COORDINATOR: &str = "coordinator:
+  states:
+    off: {}
+    up:
+      states:
+        building: { entry: build }
+        starting: { entry: run }
+        idle: {}
+        slowly: { entry: slow }
+        quickly: { config: quick }
+      transitions:
+        - { src: initial, tgt: building }
+        - { src: building, tgt: starting, events: [build.ok] }
+        - { src: starting, tgt: idle, events: [run.ok] }
+        - { src: idle, tgt: slowly, events: [e_slow] }
+        - { src: slowly, tgt: quickly, events: [e_quick] }
+    failed: {}
+    stopped: { config: stop }
+    halted: { config: halt }
+    down:
+      states:
+        d0: { entry: slow.undo }
+        stopping: { entry: run.undo }
+        removing: { entry: build.undo }
+      transitions:
+        - { src: initial, tgt: d0 }
+        - { src: d0, tgt: stopping, events: [slow.undone, slow.undo.failed, slow.undo.broken] }
+        - { src: stopping, tgt: removing, events: [run.undone, run.undo.failed, run.undo.broken] }
+    left: {}
+  transitions:
+    - { src: initial, tgt: off }
+    - { src: off, tgt: up, events: [e_start] }
+    - { src: up, tgt: failed, events: [build.failed, build.broken, run.failed, run.broken] }
+    - { src: up, tgt: stopped, events: [e_stop] }
+    - { src: failed, tgt: stopped, events: [e_stop] }
+    - { src: stopped, tgt: stopped, events: [e_stop] }
+    - { src: halted, tgt: stopped, events: [e_stop] }
+    - { src: up, tgt: halted, events: [e_halt] }
+    - { src: failed, tgt: halted, events: [e_halt] }
+    - { src: stopped, tgt: halted, events: [e_halt] }
+    - { src: halted, tgt: halted, events: [e_halt] }
+    - { src: stopped, tgt: failed, events: [e_reset] }
+    - { src: halted, tgt: failed, events: [e_reset] }
+    - { src: up, tgt: down, events: [e_end] }
+    - { src: failed, tgt: down, events: [e_end] }
+    - { src: stopped, tgt: down, events: [e_end] }
+    - { src: halted, tgt: down, events: [e_end] }
+    - { src: down, tgt: stopped, events: [e_stop] }
+    - { src: down, tgt: halted, events: [e_halt] }
+    - { src: down, tgt: off, events: [build.undone] }
+    - { src: down, tgt: left, events: [build.undo.failed, build.undo.broken] }
+    - { src: left, tgt: stopped, events: [e_stop] }
+    - { src: left, tgt: halted, events: [e_halt] }
+    - { src: left, tgt: down, events: [e_end] }
+";
+
+/// The other configurations, and what comes.
+struct Case {
+    what: &'static str,
+    configurations: [&'static str; 5],
+    comes: &'static str,
+}
+
+const LAMP: &str = "changes: [{ create: { component: k0, type: Lamp } }]";
+const NOTHING: &str = "pre_conf_state: [\"m:stopped\"]";
+const STILL: &str = "changes: [{ port_write: { port: m.speed, value: 0.0 } }]";
+const LIMIT: &str = "changes: [{ property_set: { property: m.limit, value: 0.1 } }]";
+const QUICK: &str = "changes: [{ property_set: { property: m.limit, value: 0.7 } }]";
+
+/// `run`, `slow`, `quick`, `stop`, `halt`.
+const CASES: &[Case] = &[
+    Case {
+        what: "another one, and the first again, at one instant",
+        configurations: [
+            "post_conf_state: [\"m:stopped\"]",
+            LAMP,
+            QUICK,
+            "post_conf_state: [\"m:unconfigured\"]",
+            NOTHING,
+        ],
+        comes: "raise('e_stop') wait(1) raise('e_halt') raise('e_stop') wait(1) raise('e_reset') wait(1)",
+    },
+    Case {
+        what: "pressed again after its write came too late",
+        configurations: [
+            "post_conf_state: [\"m:stopped\"]",
+            "changes: [{ property_set: { property: m.limit, value: 0.7 } }, { create: { component: k0, type: Lamp } }]",
+            QUICK,
+            LIMIT,
+            NOTHING,
+        ],
+        comes: "fault('create k0', 'slow', 1, 0.8) raise('e_slow') wait(0.2) fault('property_set m.limit', 'slow', 1, 1.3)
+                raise('e_stop') wait(3) raise('e_stop') wait(3) raise('e_reset') wait(2) recover('back') wait(1)",
+    },
+    Case {
+        what: "something ordinary over it, by force, whose call is late",
+        configurations: [
+            "changes: [{ port_write: { port: m.speed, value: 0.1 } }], post_conf_state: [\"m:stopped\"]",
+            "changes: [{ operation_call: { operation: m.clamp } }]",
+            QUICK,
+            "changes: [{ property_set: { property: m.limit, value: 0.1 } }, { port_write: { port: m.speed, value: 0.0 } }]",
+            NOTHING,
+        ],
+        comes: "raise('e_stop') wait(0.1) fault('operation_call m.clamp', 'late', 1) apply('slow', { force = true }) wait(2)
+                raise('e_stop') wait(9) raise('e_reset') wait(2)",
+    },
+    Case {
+        what: "pressed again in the instant in which what was starting is there",
+        configurations: [
+            "post_conf_state: [\"m:stopped\"]",
+            "changes: [{ property_set: { property: m.limit, value: 0.7 } }], post_conf_state: [\"m:running\"]",
+            QUICK,
+            "post_conf_state: [\"m:stopped\"]",
+            STILL,
+        ],
+        comes: "fault('start m', 'slow', 1, 0.3) fault('stop m', 'slow', 1, 1.3) raise('e_slow') wait(0.2) raise('e_stop') wait(0.1)
+                raise('e_stop') wait(5) raise('e_reset') wait(2)",
+    },
+    Case {
+        what: "something ordinary over it, by force, that another one interrupts",
+        configurations: [
+            "post_conf_state: [\"m:running\", \"n:running\"]",
+            "post_conf_state: [\"n:stopped\"]",
+            QUICK,
+            "post_conf_state: [\"m:stopped\"]",
+            STILL,
+        ],
+        comes: "fault('stop n', 'slow', 1, 0.3) raise('e_stop') wait(1) apply('slow', { force = true }) wait(0.1) raise('e_halt') wait(5)
+                raise('e_reset') wait(3) undo('slow', { force = true }) wait(1) told = state('m') recover('back') wait(1)",
+    },
+    Case {
+        what: "pressed for the third time before the second is answered",
+        configurations: [
+            "post_conf_state: [\"m:running\"]",
+            LAMP,
+            QUICK,
+            "post_conf_state: [\"m:unconfigured\"]",
+            STILL,
+        ],
+        comes: "fault('cleanup m', 'fail', 1) fault('cleanup m', 'lost', 1) raise('e_stop') wait(2) raise('e_stop') wait(1)
+                raise('e_stop') wait(9) raise('e_reset') wait(3) told = state('m') recover('back') wait(1)",
+    },
+    Case {
+        what: "while a switch that has failed goes back",
+        configurations: [
+            "post_conf_state: [\"m:running\"]",
+            "changes: [{ operation_call: { operation: m.brake } }, { create: { component: k0, type: Lamp } }]",
+            QUICK,
+            STILL,
+            NOTHING,
+        ],
+        comes: "raise('e_slow') wait(0.5) fault('operation_call m.brake', 'lost', 1) fault('property_set m.limit', 'fail', 1)
+                raise('e_quick') wait(0.5) raise('e_stop') wait(5) raise('e_reset') wait(3) recover('back') wait(1)",
+    },
+];
+
+fn demo(configurations: &[&str; 5]) -> Demo {
+    let [run, slow, quick, stop, halt] = configurations;
+    let made = "changes: [{ create: { component: m, type: Motor } }, { create: { component: n, type: Motor } }, { create: { component: l, type: Lamp } }]";
+    let demo = Demo::new();
+    demo.write("over.yaml", DEPLOYMENT);
+    demo.write("coordinator.yaml", COORDINATOR);
+    demo.write(
+        "configurations.yaml",
+        &format!(
+            "configurations:
+  build: {{ {made} }}
+  run: {{ {run} }}
+  slow: {{ group: speed, {slow} }}
+  quick: {{ group: speed, {quick} }}
+  stop: {{ safe: true, group: speed, {stop} }}
+  halt: {{ safe: true, group: speed, {halt} }}
+"
+        ),
+    );
+    demo
+}
+
+#[test]
+fn where_the_same_is_in_force_it_is_as_before() {
+    for Case { what, configurations, comes } in CASES {
+        let demo = demo(configurations);
+        demo.write(
+            "s.lua",
+            &format!(
+                "local function same(a, b)
+                   if type(a) ~= 'table' or type(b) ~= 'table' then return a == b end
+                   for k, v in pairs(a) do if not same(v, b[k]) then return false end end
+                   for k in pairs(b) do if a[k] == nil then return false end end
+                   return true
+                 end
+                 deploy('over.yaml') wait(0.2) local before = system() local told = nil
+                 {comes}
+                 local told_of = 0
+                 for _, entry in ipairs(log()) do
+                   if entry.note and string.find(entry.note, 'the emergency is over', 1, true) then told_of = told_of + 1 end
+                 end
+                 say(tostring(same(before, system())) .. ' ' .. #drift() .. ' ' .. #stack() .. ' ' .. told_of
+                   .. (told and ' ' .. told or '')) shutdown()"
+            ),
+        );
+        let ran = demo.run(&["run", "s.lua", "--clock", "simulated", "--quiet"]);
+        let said = ran.out.lines().find(|line| line.starts_with("true ") || line.starts_with("false "));
+        // What moves waits for who recovers.
+        let waited = if comes.contains("told =") { " stopped" } else { "" };
+        let expected = format!("true 0 2 1{waited}");
+        assert_eq!((said, ran.code), (Some(expected.as_str()), 0), "{what}: {}{}", ran.out, ran.err);
+    }
+}
