@@ -8,7 +8,7 @@
 -- These stop the robot wherever its drives have power: it brakes, and nothing moves until it is asked for.
 local STOPS = { "e_estop", "e_EMERGENCY_STOP", "e_OVERCURRENT", "e_OVERTEMP", "e_EC_TIMEOUT", "e_ENCODER_ERR",
                 "e_UNDERVOLTAGE", "e_HALL_ERR", "e_SINE_COMM_INIT_ERR", "e_I2T_EXCEEDED",
-                "e_overspeed", "e_base_overspeed", "e_arm_dropped", "e_arm_fell" }
+                "e_overspeed", "e_base_overspeed", "e_arm_dropped", "e_arm_fell", "e_arm_gives_way" }
 
 -- What is told where the drives take torques and part of what commands or watches them has died. Wherever they may, it stops the
 -- robot as well, but for where the very next thing asked of them is to hold by themselves; what lasts is told again.

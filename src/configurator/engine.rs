@@ -3,7 +3,7 @@
 use super::conditions::{Conditions, Standings};
 use super::confirmations::Confirmations;
 use super::control::{ConfiguratorView, ControlCommand, Moment, QueuedCommand, StoppingBegan, UrgentCommand};
-use super::emergency::BeforeEmergency;
+use super::emergency::Emergency;
 use super::inbox::{Counts, Mail};
 use super::looks::Observing;
 use super::pool::Pool;
@@ -84,8 +84,8 @@ pub(super) struct Engine {
     /// Plans that are carried out again, at most so many of each configuration, the one used last at the end.
     pub switches: FxHashMap<ConfigId, Vec<Fast>>,
     pub confirmations: Confirmations,
-    /// What there was before the emergency that is not over.
-    pub before_emergency: Option<BeforeEmergency>,
+    /// The emergency that is not over.
+    pub emergency: Option<Emergency>,
     /// Coordinators that are down.
     pub down: BTreeSet<Requester>,
     /// Requests that have begun and were not answered.
@@ -134,7 +134,7 @@ impl Engine {
             told_broken: false,
             switches: FxHashMap::default(),
             confirmations: Confirmations::default(),
-            before_emergency: None,
+            emergency: None,
             down: BTreeSet::new(),
             current: SmallVec::new(),
             revision: 0,
@@ -178,13 +178,13 @@ impl Engine {
             {
                 did = true;
                 self.begin(number);
-                self.look_whether_emergency_is_over();
+                self.look_at_emergency();
                 if self.urgent() {
                     break;
                 }
             }
             did |= self.advance_all();
-            self.look_whether_emergency_is_over();
+            self.look_at_emergency();
             self.review_standings();
             self.tell_fallen();
             self.look_at_suspects();

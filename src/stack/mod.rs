@@ -6,11 +6,12 @@
 //! begins when by the [`Desk`]. The configurator carries out what these say, `check` follows what these say.
 //!
 //! * [`request`], [`answer`]: what is asked and answered. `work`: requests become one plan. `batch`: what the requests of a
-//!   batch come to. `settle`: what comes of them when they have ended. `effort`: what a safe configuration does; `there`: of what it names, what is there to be done, also beside what it interrupts. `leave`: what a coordinator that leads down takes along. `mend`: what is broken, brought back, in one net with the undo that asks for it. `desk`, [`claims`]: who waits for whom. `world`: system, stack and what is broken, as one. `prepared`: plans that are carried out again. `pushes`: plans that are not made again.
+//!   batch come to. `settle`: what comes of them when they have ended. `effort`: what a safe configuration does; `before`: what an emergency leads back to; `there`: of what it names, what is there to be done, also beside what it interrupts. `leave`: what a coordinator that leads down takes along. `mend`: what is broken, brought back, in one net with the undo that asks for it. `desk`, [`claims`]: who waits for whom. `world`: system, stack and what is broken, as one. `prepared`: plans that are carried out again. `pushes`: plans that are not made again.
 //! * `share`: what keeps a frame from being undone. `squash`: the bound. `stands`: when what a configuration stands for is watched no more. `net`: fewer steps to the same system.
 
 pub mod answer;
 mod batch;
+mod before;
 pub mod claims;
 pub mod contenders;
 mod desk;
@@ -38,6 +39,7 @@ mod world;
 
 pub use answer::{Answer, Reason, Residual, TakenAlong};
 pub use batch::{Group, Rules, Told, held, may_apply, take_up};
+pub use before::{BeforeEmergency, difference};
 pub use desk::{ActiveBatch, Arrival, Arrived, Desk, GivenUp, Gone, given_up_of};
 pub use effort::{BestEffort, effort};
 pub use keep::keeps_still;

@@ -105,8 +105,7 @@ const SPEED_GAIN: [f64; JOINTS] = [24.0, 24.0, 12.0, 4.0, 1.5];
 /// A step back inside the soft limit before its exit is reported, as a share of the range.
 const SOFT_LIMIT_HYSTERESIS: f64 = 0.01;
 
-/// An arm that is held gives way when a joint is farther than this from where its drive holds it, in rad: it has been giving all that it
-/// has for long.
+/// An arm that is held gives way when a joint was taken along by so much from where its drive held it with all that it has, in rad.
 const GIVES_WAY: f64 = 0.05;
 
 /// As far from a stop an arm that sinks onto it is not dropped, in rad.
@@ -161,6 +160,8 @@ pub struct Drives {
     target_speed: J5,
     /// For how long the arm is still slowed before it is held where it is then, in s.
     settles: f64,
+    /// How far a joint was taken along from where it was held, in rad.
+    dragged: J5,
     outside: bool,
     base_watched: bool,
     /// A joint gave all that position control may in the last update.
@@ -190,6 +191,7 @@ impl Drives {
             target,
             target_speed: J5::zeros(),
             settles: 0.0,
+            dragged: J5::zeros(),
             outside: false,
             base_watched: false,
             presses: false,
@@ -203,10 +205,14 @@ impl Drives {
         self.identified
     }
 
-    /// The drives hold the arm with all that they have, and it goes elsewhere: it is too heavy for them, or somebody is stronger.
-    pub fn gives_way(&self) -> bool {
-        let held = self.mode == DriveMode::Positioning && !self.busy() && self.settles == 0.0;
-        held && (0..JOINTS).any(|i| (self.target[i] - self.measured.q[i]).abs() > GIVES_WAY)
+    /// The drives hold the arm with all that they have, and it goes elsewhere: it is too heavy for them, or somebody is stronger. Told once of
+    /// each way of that length.
+    pub fn gives_way(&mut self) -> bool {
+        let gives_way = self.dragged.iter().any(|way| way.abs() > GIVES_WAY);
+        if gives_way {
+            self.dragged = J5::zeros();
+        }
+        gives_way
     }
 
     /// What they do.
@@ -284,6 +290,7 @@ impl Drives {
         self.target = self.measured.q;
         self.target_speed = self.measured.qd;
         self.settles = SETTLES;
+        self.dragged = J5::zeros();
         self.resumes |= self.mode == DriveMode::Torque;
         self.mode = DriveMode::Positioning;
         self.handover.begin();

@@ -86,7 +86,6 @@ pub struct Driver {
     task: Option<Ticket>,
     /// For how long nobody has been watching, since that was told last, in s.
     unwatched: Option<f64>,
-    gives_way: Option<f64>,
     /// The same of the arm.
     unheard: Option<f64>,
     /// Where it was heard last.
@@ -122,7 +121,6 @@ impl Component for Driver {
             }
             c.running = true;
             (c.unwatched, c.unheard, c.waits_for_arm, c.goes_off) = (None, None, None, false);
-            c.gives_way = None;
             Ok(())
         })
         .on_stop(|c, _| {
@@ -218,7 +216,7 @@ impl Component for Driver {
                 emergency: b.event("e_EMERGENCY_STOP"),
                 unwatched: b.doc("The monitors were not heard for 40 ms while the drives take torques.").event("e_watch_lost"),
                 gives_way: b
-                    .doc("The drives hold the arm with all that they have, and a joint is 0.05 rad away from there: it is too heavy for them, or somebody is stronger.")
+                    .doc("The drives hold the arm with all that they have, and a joint was taken along by 0.05 rad: it is too heavy for them, or somebody is stronger.")
                     .event("e_arm_gives_way"),
                 faults: FAULTS.each_ref().map(|fault| b.doc(&format!("{}; the drives hold.", fault.what)).event(fault.event)),
             },
@@ -233,7 +231,6 @@ impl Component for Driver {
             counters: Encoders::default(),
             heat: HeatLimit::default(),
             unwatched: None,
-            gives_way: None,
             unheard: None,
             plant: PlantState::default(),
         }
@@ -326,8 +323,9 @@ impl Component for Driver {
         let lost = aged(&mut self.watched, cx).is_some_and(|(_, age)| age > UNWATCHED);
         let lost = lost && self.drives.mode() == DriveMode::Torque;
         self.unwatched = self.again(lost, self.unwatched, cx.dt(), |c| c.events.raise(c.names.unwatched));
-        let gives_way = self.drives.gives_way();
-        self.gives_way = self.again(gives_way, self.gives_way, cx.dt(), |c| c.events.raise(c.names.gives_way));
+        if self.drives.gives_way() {
+            self.events.raise(self.names.gives_way);
+        }
         self.publish(&plant, &driven, cx);
     }
 }

@@ -33,7 +33,9 @@ impl Drives {
             }
             // Pushed further than the drive can hold, it stays there: it would be flung back when it is let go.
             let lead = self.parameters.tau_max[i] / POSITION_GAIN[i];
-            self.target[i] = self.target[i].clamp(self.measured.q[i] - lead, self.measured.q[i] + lead);
+            let held = self.target[i];
+            self.target[i] = held.clamp(self.measured.q[i] - lead, self.measured.q[i] + lead);
+            self.dragged[i] += self.target[i] - held;
         }
         self.target += self.target_speed * dt;
     }
