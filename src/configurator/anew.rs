@@ -22,6 +22,8 @@ impl Engine {
     /// for ever: then what is under way ends at once, on what the model knows, and what waits is answered, since it may be what panics.
     pub(super) fn survive(&mut self, text: &str) {
         self.panics += 1;
+        // What has come of what was under way is not known so well.
+        self.emergency = None;
         let _ = catch_unwind(AssertUnwindSafe(|| {
             self.given.tells(|| Progress::Survived(text.to_owned()));
         }));

@@ -6,7 +6,7 @@ use super::repair::By;
 use super::request::Reason;
 use super::running::Running;
 use crate::model::ComponentName;
-use crate::stack::{BeforeEmergency, Broken, FrameId, Residual, World, difference};
+use crate::stack::{BeforeEmergency, Broken, FrameId, Residual, World};
 use crate::system::{System, touch};
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -29,6 +29,19 @@ impl Engine {
         }
         let before = BeforeEmergency::new(stack, without.unwrap_or(system).clone());
         self.emergency = Some(Emergency { before, looked_at: None });
+    }
+
+    /// A component has failed.
+    pub(super) fn fails_in_emergency(&mut self, component: ComponentName) {
+        if let Some(emergency) = &mut self.emergency {
+            emergency.before.has_failed(component);
+            emergency.looked_at = None;
+        }
+    }
+
+    /// Somebody takes what is there for what is to be there, or part of it.
+    pub(super) fn is_accepted(&mut self) {
+        self.emergency = None;
     }
 
     /// Whether some frame is in force in part.
@@ -59,9 +72,8 @@ impl Engine {
         if self.is_in_part() {
             return;
         }
-        let wanted = self.emergency.take().and_then(|emergency| emergency.before.wanted(&self.world.stack));
-        let Some(wanted) = wanted else { return };
-        let difference = difference(&wanted, &self.world.system, &self.world.system);
+        let Some(emergency) = self.emergency.take() else { return };
+        let Some((wanted, difference)) = emergency.before.left(&self.world.system, &self.world.stack) else { return };
         if difference.is_empty() {
             return;
         }

@@ -350,7 +350,10 @@ impl Engine {
             conditions.nudge();
         }
         match event {
-            PlatformEvent::Faulted { component, .. } => self.suspects.report_fault(component),
+            PlatformEvent::Faulted { component, .. } => {
+                self.suspects.report_fault(component);
+                self.fails_in_emergency(component);
+            }
             PlatformEvent::Returned { component, .. } => {
                 self.suspects.report(component);
                 self.returned = CameBack::Now;

@@ -140,6 +140,7 @@ impl Engine {
             Some(seen) if self.running.is_empty() && self.adopt(&seen).is_ok() => {
                 self.world.stack.discard();
                 self.world.broken.clear();
+                self.is_accepted();
                 self.confirmations.clear();
                 self.changed();
                 Ok(())

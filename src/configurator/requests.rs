@@ -126,6 +126,7 @@ impl Engine {
             }
             if group.commits {
                 self.world.stack.make_permanent(requests[0].requester);
+                self.is_accepted();
                 self.forget_confirmations();
                 self.changed();
             }

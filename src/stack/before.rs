@@ -4,11 +4,12 @@
 //! go of. What all that comes to is held against the picture of before.
 
 use super::{Frame, Inverse, Op, Stack, transaction};
-use crate::model::{RunState, Step};
+use crate::model::{ComponentName, RunState, Step};
 use crate::plan::footprint::{Footprint, Saved, Slot};
 use crate::plan::undo::{DraftStep, in_order};
 use crate::plan::{PlanContext, PlannedStep};
 use crate::system::{self, Overlay, System, View as _, step, touch};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 /// The system before an emergency, and what was in force.
@@ -16,26 +17,37 @@ use std::sync::Arc;
 pub struct BeforeEmergency {
     frames: Vec<Arc<Frame>>,
     system: System,
+    /// Components that were faulted then, or have failed since.
+    failed: BTreeSet<ComponentName>,
 }
 
 impl BeforeEmergency {
     /// As it is now; `system` is without what the emergency interrupts.
     pub fn new(stack: &Stack, system: System) -> Self {
-        Self { frames: stack.frames().to_vec(), system }
+        let failed = system.graph().node_weights().filter(|node| node.state == RunState::Faulted);
+        let failed = failed.map(|node| node.name).collect();
+        Self { frames: stack.frames().to_vec(), system, failed }
     }
 
-    /// The picture of that time without the newest frames that are not in force any more. None: something came since. What that has found
-    /// as it wants it, it has not done, and keeps all the same: nothing is known of what is to be there.
-    pub fn wanted(&self, stack: &Stack) -> Option<System> {
-        let (frames, now) = (&self.frames, stack.frames());
-        let is_same = now.len() <= frames.len() && now.iter().zip(frames).all(|(now, before)| now.id == before.id);
-        let gone = frames.get(now.len()..).filter(|_| is_same)?;
-        let mut system = self.system.clone();
-        let mut go = |step: &Step| step::apply(step, &mut system).ok().map(drop);
-        for frame in gone.iter().rev() {
-            items(frame).iter().try_for_each(|item| go(&item.step))?;
-        }
-        Some(system)
+    /// How the picture differs from that of then, where the very frames of then are in force. None: they are not. What came since may have found
+    /// what it wants already, and keeps that; what went may have been made permanent.
+    pub fn left(&self, system: &System, stack: &Stack) -> Option<(&System, Vec<Step>)> {
+        let is_same = self.frames.iter().map(|frame| frame.id).eq(stack.frames().iter().map(|frame| frame.id));
+        is_same.then(|| (&self.system, self.difference(&self.system, system)))
+    }
+
+    /// Nothing is known any more of a component that has failed meanwhile: nobody's undo brings it back.
+    pub fn has_failed(&mut self, component: ComponentName) {
+        self.failed.insert(component);
+    }
+
+    /// The steps from one picture to another, but for what is about components that have failed.
+    fn difference(&self, from: &System, to: &System) -> Vec<Step> {
+        let is_faulted = |picture: &System, name| picture.component(name).is_some_and(|n| n.state == RunState::Faulted);
+        let has_failed = |name| self.failed.contains(&name) || is_faulted(from, name) || is_faulted(to, name);
+        let mut steps = system::diff(from, to);
+        steps.retain(|step| !touch::components(step).into_iter().any(has_failed));
+        steps
     }
 
     /// The only safe configuration that is left of the emergency, the newest frame of all, as it leads back to there. None: it is not the only
@@ -51,10 +63,10 @@ impl BeforeEmergency {
             planned.steps.iter().try_for_each(|planned| step::apply(&planned.step, &mut led).ok().map(drop))?;
             Some(led)
         });
-        if led.is_some_and(|led| difference(&led, &self.system, system).is_empty()) {
+        if led.is_some_and(|led| self.difference(&led, &self.system).is_empty()) {
             return None;
         }
-        let way = in_order(system, difference(system, &self.system, system)).ok()?;
+        let way = in_order(system, self.difference(system, &self.system)).ok()?;
         let calls = items(frame).into_iter().filter(|item| matches!(item.step, Step::Operation(_)));
         let mut view = Overlay::new(system);
         let mut touches = frame.footprint.touches.clone();
@@ -98,12 +110,4 @@ fn items(frame: &Frame) -> Vec<DraftStep> {
         }
         Inverse::List(items) => items.to_vec(),
     }
-}
-
-/// The steps from one picture to another, but for what is about components that are faulted in a third one: nobody has brought that about.
-pub fn difference(from: &System, to: &System, now: &System) -> Vec<Step> {
-    let is_faulted = |name| now.component(name).is_some_and(|node| node.state == RunState::Faulted);
-    let mut steps = system::diff(from, to);
-    steps.retain(|step| !touch::components(step).into_iter().any(is_faulted));
-    steps
 }

@@ -42,6 +42,17 @@ impl Broken {
     }
 }
 
+/// What a step writes there, if it does.
+fn written_by(step: &Step, slot: Slot) -> Option<Saved> {
+    match (step, slot) {
+        (Step::PropertySet { property, value }, Slot::Property(of)) if *property == of => {
+            Some(Saved::Property(value.clone()))
+        }
+        (Step::PortWrite { port, value }, Slot::Port(of)) if *port == of => Some(Saved::Port(value.clone())),
+        _ => None,
+    }
+}
+
 impl World {
     /// The picture with something broken as the model has it.
     pub fn as_meant(&self, broken: &Broken) -> System {
@@ -104,12 +115,17 @@ impl World {
         if let Some((_, value)) = seen.and_then(|seen| seen.written.iter().find(|(of, _)| *of == slot)) {
             return Some(value.clone());
         }
+        // One that is not there any more, and is made anew, is to be as that had made it as well.
+        let done = || last.steps().iter().rev().find_map(|planned| written_by(&planned.step, slot));
         match slot {
             Slot::Property(property) => {
                 let value = self.system.component(property.component).and_then(|node| node.value(property.member));
-                value.cloned().map(Saved::Property)
+                value.cloned().map(Saved::Property).or_else(done)
             }
-            Slot::Port(port) => step::written(port, &self.system).map(|value| Saved::Port(value.cloned())),
+            Slot::Port(port) if self.system.component(port.component).is_some() => {
+                step::written(port, &self.system).map(|value| Saved::Port(value.cloned()))
+            }
+            Slot::Port(_) => done(),
             _ => None,
         }
     }

@@ -7,10 +7,10 @@ use super::{
     void::{self, TakenAway},
 };
 use crate::model::finding::count;
-use crate::model::{ComponentName, ConfigId, Configuration, Finding, Findings, MemberRef, OnFailure, Step, codes};
+use crate::model::{ConfigId, Configuration, Finding, Findings, MemberRef, OnFailure, codes};
 use crate::plan::undo::{DraftStep, Script, undo};
 use crate::plan::{PlanContext, PlannedStep, Refusal, StepId};
-use crate::system::{Overlay, System, View, Violation, step};
+use crate::system::{Overlay, System, Violation, step};
 use crate::time::Time;
 use rustc_hash::FxHashSet;
 use smallvec::SmallVec;

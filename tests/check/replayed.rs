@@ -212,3 +212,47 @@ leaving: { says: e_leaving, until: e_released }\n";
         |text: &String| text.contains("raise(\"e_released\")") && text.contains("wait_answer(\"run.undo.failed\", 0)");
     assert!(texts.iter().any(waits), "{:#}{texts:#?}", said.0);
 }
+
+/// One event confirms what waits for it, what is under way, and what waits its turn; and of two that nobody confirms the one that came first is
+/// taken back first.
+#[test]
+fn what_confirms_counts_for_all_that_was_asked_for() {
+    let conf = "base = Configuration { create('a', 'Drive'), create('b', 'Drive') },
+                trial = Configuration { property_set('a.gain', 2.0), confirm = { event = 'e_fine', within = 0.5 } },
+                trial2 = Configuration { property_set('b.gain', 2.0), confirm = { event = 'e_fine', within = 0.5 } }";
+    let life = |trying: &str, more: &str| {
+        format!(
+            "idle = state {{}}, building = state {{ entry = 'base' }}, up = state {{}}, trying = state {{ {trying} }}, good = state {{}},
+             leaving = state {{ entry = {{ 'trial2.undo', 'trial.undo', 'base.undo' }} }}, stays = state {{}},
+             trans {{ src = 'initial', tgt = 'idle' }},
+             trans {{ src = 'idle', tgt = 'building', events = {{ 'e_start' }} }},
+             trans {{ src = 'building', tgt = 'up', events = {{ 'base.ok' }} }},
+             trans {{ src = 'building', tgt = 'leaving', events = {{ 'base.failed', 'base.broken', 'e_shutdown' }} }},
+             trans {{ src = 'up', tgt = 'trying', events = {{ 'e_try' }} }},
+             trans {{ src = 'up', tgt = 'leaving', events = {{ 'e_shutdown' }} }},
+             trans {{ src = 'trying', tgt = 'leaving', events = {{ 'e_shutdown', 'trial.failed', 'trial2.failed' }} }},
+             trans {{ src = 'good', tgt = 'leaving', events = {{ 'e_shutdown' }} }},
+             trans {{ src = 'leaving', tgt = 'idle', events = {{ 'base.undone' }} }},
+             trans {{ src = 'leaving', tgt = 'stays', events = {{ 'base.undo.failed', 'base.undo.broken' }} }},
+             trans {{ src = 'stays', tgt = 'leaving', events = {{ 'e_shutdown' }} }},{more}"
+        )
+    };
+    let emits = "emits: [e_fine]\n";
+    for (trying, more, emits) in [
+        ("entry = { 'trial', 'trial2' }", "trans { src = 'trying', tgt = 'good', events = { 'e_fine' } },", ""),
+        ("entry = { 'trial', 'trial2' }", "trans { src = 'trying', tgt = 'good', events = { 'trial2.ok' } },", ""),
+        ("entry = { 'trial', 'e_fine' }", "trans { src = 'trying', tgt = 'good', events = { 'trial.ok' } },", emits),
+        (
+            "entry = 'trial'",
+            "then2 = state { entry = 'trial2' }, trans { src = 'trying', tgt = 'then2', events = { 'trial.ok' } },
+             trans { src = 'then2', tgt = 'good', events = { 'e_fine' } },
+             trans { src = 'then2', tgt = 'up', events = { 'trial.reverted', 'trial2.reverted' } },
+             trans { src = 'then2', tgt = 'leaving', events = { 'e_shutdown' } },",
+            "",
+        ),
+    ] {
+        // Every way is gone by a script, where it is not said that none can.
+        let said = Small::new(conf, &life(trying, more), emits).check();
+        assert!(!said.0["findings"].as_array().unwrap().is_empty(), "{trying} {more}");
+    }
+}

@@ -176,19 +176,6 @@ const CASES: &[Case] = &[
         told: "0 running",
     },
     Case {
-        what: "while a switch that has failed goes back",
-        configurations: [
-            "post_conf_state: [\"m:running\"]",
-            "changes: [{ operation_call: { operation: m.brake } }, { create: { component: k0, type: Lamp } }]",
-            QUICK,
-            STILL,
-            NOTHING,
-        ],
-        comes: "raise('e_slow') wait(0.5) fault('operation_call m.brake', 'lost', 1) fault('property_set m.limit', 'fail', 1)
-                raise('e_quick') wait(0.5) raise('e_stop') wait(5) raise('e_reset') wait(3) recover('back') wait(1)",
-        told: "1",
-    },
-    Case {
         what: "two at one instant that free one in-port",
         configurations: [
             "post_conf_state: [\"m:running\"]",
@@ -275,5 +262,87 @@ fn where_the_same_is_in_force_it_is_as_before() {
         let said = ran.out.lines().find(|line| line.starts_with("true ") || line.starts_with("false "));
         let expected = format!("true 0 2 {told}");
         assert_eq!((said, ran.code), (Some(expected.as_str()), 0), "{what}: {}{}", ran.out, ran.err);
+    }
+}
+
+/// What an operator has accepted, or made permanent, while an emergency was in force is not taken back by its end.
+#[test]
+fn what_was_accepted_meanwhile_stays() {
+    let stop = "changes: [{ port_write: { port: m.speed, value: 0.0 } }], post_conf_state: [\"m:stopped\"]";
+    let demo = demo(&["post_conf_state: [\"m:running\", \"n:running\"]", LAMP, QUICK, stop, STILL]);
+    for (comes, said) in [
+        (
+            "fault('stop m', 'fail', 3) raise('e_stop') wait(2) recover('accept') wait(1)",
+            "m running n running l x, limit 0.5, told 0",
+        ),
+        (
+            "set('m.limit', 0.9, { force = true, within = 1 }) raise('e_stop') wait(1) commit{ force = true } wait(1)
+             raise('e_reset') wait(1)",
+            "m running n running l x, limit 0.9, told 0",
+        ),
+        (
+            "raise('e_stop') wait(1) set('m.limit', 0.9, { force = true, within = 1 }) commit{ force = true } wait(1)
+             raise('e_reset') wait(1)",
+            "m running n running l x, limit 0.9, told 0",
+        ),
+    ] {
+        demo.write(
+            "s.lua",
+            &format!(
+                "deploy('over.yaml') wait(0.2) {comes}
+                 local told = 0
+                 for _, entry in ipairs(log()) do
+                   if entry.note and string.find(entry.note, 'the emergency is over', 1, true) then told = told + 1 end
+                 end
+                 say('m ' .. tostring(state('m')) .. ' n ' .. tostring(state('n')) .. (state('l') and ' l' or '') .. (state('x') and ' x' or '')
+                   .. ', limit ' .. property('m.limit') .. ', told ' .. told) shutdown{{ force = true }}"
+            ),
+        );
+        let ran = demo.run(&["run", "s.lua", "--clock", "simulated", "--quiet"]);
+        let found = ran.out.lines().find(|line| line.starts_with("m "));
+        assert_eq!(found, Some(said), "{comes}: {}{}", ran.out, ran.err);
+    }
+}
+
+/// A component that has failed since is brought back by nobody's undo; and one that came back late, and is made anew while the emergency is in
+/// force, is as that wants it.
+#[test]
+fn what_failed_or_came_back_late_meanwhile() {
+    let demo = demo(&["", "", "", "", ""]);
+    let types =
+        &DEPLOYMENT[DEPLOYMENT.find("types:").expect("types")..DEPLOYMENT.find("configurations:").expect("the end")];
+    let own = "libraries: [standard]\nactivities: { loop: { period_ms: 5.0, priority: 10 } }\n";
+    demo.write("over.yaml", &DEPLOYMENT.replace(types, own).replace("platform: simulated", "platform: embedded"));
+    demo.write(
+        "configurations.yaml",
+        "configurations:
+  build: { changes: [{ create: { component: n, type: standard.Pid, activity: loop } }] }
+  run: { post_conf_state: [\"n:running\"] }
+  slow: { group: speed, changes: [{ property_set: { property: n.ki, value: 0.7 } }] }
+  quick: { group: speed, changes: [{ property_set: { property: n.ki, value: 0.8 } }] }
+  stop: { safe: true, group: speed, changes: [{ property_set: { property: n.kp, value: 0.1 } }] }
+  halt: { safe: true, group: speed, changes: [{ property_set: { property: n.kp, value: 0.2 } }] }
+  off: { pre_conf_state: [\"n:unconfigured\"] }
+",
+    );
+    for (comes, said) in [
+        (
+            "raise('e_stop') wait(1) inject('n', 'panic') wait(1) apply('off', { force = true }) wait(1)
+             undo('off', { force = true }) wait(1) raise('e_reset') wait(1)",
+            "n unconfigured 1.0",
+        ),
+        (
+            "inject('n', 'stall', { seconds = 8 }) raise('e_halt') wait(0.1) raise('e_stop') wait(1)
+             apply('off', { force = true }) wait(12)",
+            "n running 0.1",
+        ),
+    ] {
+        demo.write(
+            "s.lua",
+            &format!("deploy('over.yaml') wait(0.2) {comes} say('n ' .. state('n') .. ' ' .. property('n.kp')) shutdown{{ force = true }}"),
+        );
+        let ran = demo.run(&["run", "s.lua", "--clock", "simulated", "--quiet"]);
+        let found = ran.out.lines().find(|line| line.starts_with("n "));
+        assert_eq!(found, Some(said), "{comes}: {}{}", ran.out, ran.err);
     }
 }

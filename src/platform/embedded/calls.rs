@@ -10,7 +10,6 @@ use crate::runtime::activity::{ActivityThread, OperationJob};
 use crate::runtime::builder::CallerFn;
 use crate::runtime::call::{CallProgress, Reply, Responder};
 use crate::runtime::cell::{Cell, CellGuard, CellRequest};
-use crate::runtime::gate::Closed;
 use crate::runtime::guard;
 use crate::time::{Receiver, RecvError, Sender, Time, lock};
 use std::sync::Arc;

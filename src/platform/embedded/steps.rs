@@ -49,18 +49,18 @@ impl Naps {
 }
 
 /// What came of going in at a component's gate.
-pub(super) type Entered<T> = Result<Result<T, Closed>, Cause>;
+pub(super) type GateResult<T> = Result<Result<T, Closed>, Cause>;
 
 /// What is to be done with which component.
 type Errand<'a> = (ComponentName, &'a str);
 
 /// Whether somebody else is inside, who will leave.
-fn is_busy<T>(entered: &Entered<T>) -> bool {
+fn is_busy<T>(entered: &GateResult<T>) -> bool {
     matches!(entered, Ok(Err(Closed::Busy)))
 }
 
 /// Who is still inside was waited for.
-fn opened<T>(entered: Entered<T>, (name, what): Errand) -> Result<T, Cause> {
+fn opened<T>(entered: GateResult<T>, (name, what): Errand) -> Result<T, Cause> {
     entered?.map_err(|why| match why {
         Closed::State(state) => Cause::Refused(format!("cannot {what} `{name}` while it is {state}")),
         Closed::Busy => Cause::Timeout,
@@ -144,7 +144,7 @@ impl Inner {
         errand: Errand,
         deadline: Time,
         withdrawn: impl Fn() -> bool,
-        mut enter: impl FnMut() -> Entered<T>,
+        mut enter: impl FnMut() -> GateResult<T>,
     ) -> Result<T, Cause> {
         let mut naps = Naps::default();
         loop {
@@ -164,7 +164,7 @@ impl Inner {
     /// What came of a [`shift`](Self::shift), which is tried again until nobody is inside the component.
     pub(super) fn shifted_when_free(
         &self,
-        shifted: Entered<()>,
+        shifted: GateResult<()>,
         (name, transition): (ComponentName, Transition),
         deadline: Time,
         safe: bool,
@@ -188,7 +188,13 @@ impl Inner {
     }
 
     /// Moves a component to another state, without its hook and without waiting.
-    pub(super) fn shift(&self, registry: &mut Registry, slot: u32, transition: Transition, safe: bool) -> Entered<()> {
+    pub(super) fn shift(
+        &self,
+        registry: &mut Registry,
+        slot: u32,
+        transition: Transition,
+        safe: bool,
+    ) -> GateResult<()> {
         if transition == Transition::Start {
             registry.enlist(slot, &self.clock)?;
         }
