@@ -58,10 +58,9 @@ impl Product<'_> {
         states
     }
 
-    /// What is told behind so many batches confirms what these, and others before, ask for. Where several coordinators ask it is
-    /// not known what came first.
+    /// What is told behind so many batches confirms what these, and others before, ask for.
     fn confirms_early(&self, states: &mut States, reaction: &Macrostep, behind: usize) {
-        for emitted in reaction.emitted.iter().filter(|emitted| self.members.len() == 1 && emitted.behind == behind) {
+        for emitted in reaction.emitted.iter().filter(|emitted| emitted.behind == behind) {
             states.iter_mut().for_each(|state| self.confirm_early(state, emitted.event));
         }
     }
@@ -224,6 +223,7 @@ impl Product<'_> {
             state.down |= bit(number);
             return state;
         }
+        self.asks_anew(&mut state, batch);
         // To come to *down* twice with nothing asked for in between, by anybody, is to come once.
         let same =
             |other: &Batch| other.requests.first().map(|r| r.requester) == batch.requests.first().map(|r| r.requester);

@@ -6,6 +6,7 @@ use super::seldom::Unconfirmed;
 use super::state::{Answers, Failed, Move, Next, Nexts, ProductState, States, add, index};
 use crate::limits;
 use crate::model::{Ask, ConfigId, EventName};
+use crate::stack::Batch;
 use crate::statechart::EventId;
 use smallvec::SmallVec;
 
@@ -89,9 +90,10 @@ impl Product<'_> {
         self.worlds.configuration(id).and_then(|c| c.confirm).is_some_and(|confirm| confirm.event == name)
     }
 
-    /// What comes while the configuration has been asked for, and is not there yet, confirms it as well.
+    /// What comes while the configuration has been asked for, and is not there yet, confirms it as well. Where several coordinators ask it
+    /// is not known which of them had asked by then.
     pub(super) fn confirm_early(&self, state: &mut ProductState, name: EventName) {
-        if !self.worlds.confirms || state.desk.is_empty() {
+        if !self.worlds.confirms || self.members.len() > 1 || state.desk.is_empty() {
             return;
         }
         let asked = state.desk.requests().filter_map(|request| match request.ask {
@@ -104,6 +106,14 @@ impl Product<'_> {
                 early.into_iter().for_each(|id| seldom.confirmed.push(id));
                 seldom.confirmed.sort_unstable();
             });
+        }
+    }
+
+    /// What is asked for anew is another request than the one that was confirmed, and of the two one may be gone.
+    pub(super) fn asks_anew(&self, state: &mut ProductState, batch: &Batch) {
+        if !state.confirmed.is_empty() {
+            let asks = |id: &ConfigId| batch.requests.iter().any(|request| request.ask == Ask::Apply(*id));
+            state.change(|seldom| seldom.confirmed.retain(|id| !asks(id)));
         }
     }
 

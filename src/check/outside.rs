@@ -289,7 +289,7 @@ impl Product<'_> {
 
     /// Whether an event comes from outside, and some coordinator hears it.
     fn is_heard(&mut self, state: &ProductState, event: EventName) -> bool {
-        self.outside.contains(&event) && !self.hearers(state, event, None).is_empty()
+        self.members.len() == 1 && self.outside.contains(&event) && !self.hearers(state, event, None).is_empty()
     }
 
     /// Whether one that came before it, and is to be confirmed within no more time, is taken back first.
