@@ -2,10 +2,13 @@
 //! wait for no call that was given up.
 
 use super::Inner;
+use super::steps::{Naps, opened};
 use crate::model::{ComponentName, Ident, Injection, RunState, Value};
+use crate::platform::Cause;
 use crate::runtime::activity::OperationJob;
 use crate::runtime::call::{CallProgress, Reply, Responder};
 use crate::runtime::cell::{Cell, CellGuard, CellRequest};
+use crate::runtime::gate::Closed;
 use crate::time::{Time, lock};
 use std::sync::Arc;
 
@@ -14,7 +17,7 @@ impl Inner {
     pub(super) fn inject(&self, name: ComponentName, injection: &Injection, deadline: Time) -> Result<(), String> {
         let (reply, replied) = self.clock.channel(1);
         let call = Responder(Arc::new(CallProgress::new(reply, None, None)));
-        let (cell, running) = {
+        let (cell, requests, activity) = {
             let registry = lock(&self.registry);
             let slot = registry.find(name).map_err(|cause| cause.to_string())?;
             let entry = registry.entry(slot);
@@ -25,24 +28,32 @@ impl Inner {
                 let beside = format!("`{operation}` runs beside `{name}`, in the thread of who calls it");
                 return Err(format!("{beside}: it cannot be held up"));
             }
-            let cell = entry.cell.clone();
-            let running = (cell.state() == RunState::Running).then(|| {
-                let scheduled = registry.activity_of(slot);
-                (scheduled.requests.clone(), scheduled.activity.clone())
-            });
-            (cell, running)
+            let scheduled = registry.activity_of(slot);
+            (entry.cell.clone(), scheduled.requests.clone(), scheduled.activity.clone())
         };
         let Some(asked) = asked(&cell, injection)? else { return Ok(()) };
-        match running {
-            Some((requests, activity)) => {
-                let job = OperationJob { cell, asked, call, safe: true };
+        // Who is inside a component that does not run is waited for, and it may run then.
+        let mut naps = Naps::default();
+        let inside = loop {
+            if cell.state() == RunState::Running {
+                break None;
+            }
+            match CellGuard::idle(&*cell, true, |_| true) {
+                Ok(inside) => break Some(inside),
+                Err(Closed::Busy | Closed::State(RunState::Running)) if naps.take(&self.clock, deadline) => {}
+                Err(why) => {
+                    let refused: Result<(), Cause> = opened(Ok(Err(why)), (name, "inject anything into"));
+                    return refused.map_err(|cause| cause.to_string());
+                }
+            }
+        };
+        match inside {
+            None => {
+                let job = OperationJob { cell: cell.clone(), asked, call, safe: true };
                 requests.try_send(job).map_err(|_| format!("too much waits for the activity `{}`", activity.name))?;
                 activity.signal.notify();
             }
-            None => {
-                let enter = || Ok(CellGuard::idle(&*cell, true, |_| true));
-                let inside = self.when_free((name, "inject anything into"), deadline, || false, enter);
-                let inside = inside.map_err(|cause| cause.to_string())?;
+            Some(inside) => {
                 self.operate_idle(inside, &cell, asked, call).map_err(|cause| cause.to_string())?;
             }
         }

@@ -52,7 +52,7 @@ impl Naps {
 pub(super) type GateResult<T> = Result<Result<T, Closed>, Cause>;
 
 /// What is to be done with which component.
-type Errand<'a> = (ComponentName, &'a str);
+pub(super) type Errand<'a> = (ComponentName, &'a str);
 
 /// Whether somebody else is inside, who will leave.
 fn is_busy<T>(entered: &GateResult<T>) -> bool {
@@ -60,7 +60,7 @@ fn is_busy<T>(entered: &GateResult<T>) -> bool {
 }
 
 /// Who is still inside was waited for.
-fn opened<T>(entered: GateResult<T>, (name, what): Errand) -> Result<T, Cause> {
+pub(super) fn opened<T>(entered: GateResult<T>, (name, what): Errand) -> Result<T, Cause> {
     entered?.map_err(|why| match why {
         Closed::State(state) => Cause::Refused(format!("cannot {what} `{name}` while it is {state}")),
         Closed::Busy => Cause::Timeout,
