@@ -5,7 +5,7 @@ use super::input::{Parameters, is_deployment, unread};
 use super::{CommandContext, CommandFailure, CommandResult, Run, write_output};
 use crate::diagnostics::Language;
 use crate::lang::{self, LoadOptions, Sources};
-use crate::model::codes::{CLI_OVERWRITES, CONVERT_FUNCTIONS, CONVERT_SUBSYSTEMS};
+use crate::model::codes::{CLI_OVERWRITES, CLI_UNWRITABLE, CONVERT_FUNCTIONS, CONVERT_SUBSYSTEMS};
 use crate::model::{Finding, Findings, Statechart};
 use crate::statechart::compile;
 use std::path::{Path, PathBuf};
@@ -112,11 +112,26 @@ fn write_all(
     texts: &[(String, String)],
     force: bool,
 ) -> Result<(), CommandFailure> {
-    let other = |(name, text): &&(String, String)| {
+    let unlike = |(name, text): &&(String, String)| {
         let path = directory.join(name);
-        path.exists() && std::fs::read(path).is_ok_and(|there| there != text.as_bytes())
+        let there = path.metadata().ok().filter(std::fs::Metadata::is_file);
+        let same = |there: std::fs::Metadata| {
+            there.len() == text.len() as u64 && std::fs::read(&path).is_ok_and(|there| there == text.as_bytes())
+        };
+        path.symlink_metadata().is_ok() && !there.is_some_and(same)
     };
-    let others: Vec<String> = texts.iter().filter(other).map(|(name, _)| format!("`{name}`")).collect();
+    let is_no_file = |(name, _): &&(String, String)| {
+        let path = directory.join(name);
+        path.symlink_metadata().is_ok() && !path.is_file()
+    };
+    if let Some((name, _)) = texts.iter().find(is_no_file) {
+        return Err(CommandFailure::usage(
+            CLI_UNWRITABLE,
+            format!("{}: it is no file; nothing was written", directory.join(name).display()),
+            "name another directory",
+        ));
+    }
+    let others: Vec<String> = texts.iter().filter(unlike).map(|(name, _)| format!("`{name}`")).collect();
     if !force && !others.is_empty() {
         let (is, them) = if others.len() == 1 { ("is", "it") } else { ("are", "them") };
         return Err(CommandFailure::usage(

@@ -283,6 +283,31 @@ fn graphs_come_in_three_formats() {
     assert!(demo.read("picture.svg").contains("fast_mode"));
 }
 
+/// The names of what is written into a directory are the program's: what is there with another text is somebody's.
+#[test]
+fn converting_into_a_directory_writes_over_nothing() {
+    let demo = Demo::new();
+    let convert =
+        |more: &[&str]| demo.run(&[&["convert", "deployment.yaml", "--to", "yaml", "-o", "out"][..], more].concat());
+    assert_eq!(convert(&[]).code, 0, "nothing was there");
+    assert_eq!(convert(&[]).code, 0, "the same texts");
+    demo.write("out/configurations.yaml", "mine: 1\n");
+    let refused = convert(&[]);
+    assert!(refused.code == 2 && refused.err.contains("cli::overwrites"), "{}", refused.err);
+    assert!(
+        refused.err.contains("`configurations.yaml` is there") && refused.err.contains("--force"),
+        "{}",
+        refused.err
+    );
+    assert_eq!(demo.read("out/configurations.yaml"), "mine: 1\n");
+    assert_eq!(convert(&["--force"]).code, 0);
+    assert_ne!(demo.read("out/configurations.yaml"), "mine: 1\n");
+    std::fs::remove_file(demo.path("out/configurations.yaml")).expect("it was there");
+    std::os::unix::fs::symlink("/dev/full", demo.path("out/configurations.yaml")).expect("a link");
+    let refused = convert(&["--force"]);
+    assert!(refused.code == 2 && refused.err.contains("it is no file"), "{}", refused.err);
+}
+
 #[test]
 fn converting_there_and_back_changes_nothing() {
     let demo = Demo::new();
