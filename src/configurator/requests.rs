@@ -336,7 +336,8 @@ impl Engine {
                 Ask::Apply(id) | Ask::UndoOf(id) => Some((id, request.requester)),
                 _ => None,
             };
-            let broken = Broken { residual, components, culprit, frame, mendable: true, expected, guests, seen: None };
+            let of_nobody = Broken::of_nobody(residual, components, expected);
+            let broken = Broken { culprit, frame, mendable: true, guests, ..of_nobody };
             self.world.ends_broken(broken);
         }
         self.changed();

@@ -42,17 +42,6 @@ impl Broken {
     }
 }
 
-/// What a step writes there, if it does.
-fn written_by(step: &Step, slot: Slot) -> Option<Saved> {
-    match (step, slot) {
-        (Step::PropertySet { property, value }, Slot::Property(of)) if *property == of => {
-            Some(Saved::Property(value.clone()))
-        }
-        (Step::PortWrite { port, value }, Slot::Port(of)) if *port == of => Some(Saved::Port(value.clone())),
-        _ => None,
-    }
-}
-
 impl World {
     /// The picture with something broken as the model has it.
     pub fn as_meant(&self, broken: &Broken) -> System {
@@ -75,6 +64,8 @@ impl World {
     /// Something is broken from now on. What the model has of it may have been written by safe configurations in force: what is
     /// expected is without that, since their undo is to lead there.
     pub fn breaks(&mut self, mut broken: Broken) {
+        let held = self.overwritten(&broken).filter_map(|(_, saved)| Some((saved.slot, self.value(saved.slot)?)));
+        broken.held = held.collect();
         let written = self.overwritten(&broken).map(|(_, saved)| saved.clone());
         written.collect::<Vec<_>>().iter().for_each(|saved| put_back(saved, &mut broken.expected));
         for (name, one) in &mut broken.expected.components {
@@ -116,16 +107,18 @@ impl World {
             return Some(value.clone());
         }
         // One that is not there any more, and is made anew, is to be as that had made it as well.
-        let done = || last.steps().iter().rev().find_map(|planned| written_by(&planned.step, slot));
+        let held = || broken.held.iter().find(|(of, _)| *of == slot).map(|(_, value)| value.clone());
+        self.value(slot).or_else(held)
+    }
+
+    /// What the picture has there.
+    fn value(&self, slot: Slot) -> Option<Saved> {
         match slot {
             Slot::Property(property) => {
                 let value = self.system.component(property.component).and_then(|node| node.value(property.member));
-                value.cloned().map(Saved::Property).or_else(done)
+                value.cloned().map(Saved::Property)
             }
-            Slot::Port(port) if self.system.component(port.component).is_some() => {
-                step::written(port, &self.system).map(|value| Saved::Port(value.cloned()))
-            }
-            Slot::Port(_) => done(),
+            Slot::Port(port) => step::written(port, &self.system).map(|value| Saved::Port(value.cloned())),
             _ => None,
         }
     }

@@ -28,13 +28,15 @@ pub struct Broken {
     /// What safe configurations had done, where what is broken was seen by looking: the model had that too. None: what is there
     /// of theirs is as they left it.
     pub seen: Option<SafeWrites>,
+    /// What safe configurations in force had written of it when it broke.
+    pub held: Vec<(Slot, Saved)>,
 }
 
 impl Broken {
     /// What no configuration is known to have left so, and what is not mended unasked.
     pub fn of_nobody(residual: Arc<Residual>, components: BTreeSet<ComponentName>, expected: Snapshot) -> Self {
         let (culprit, frame, guests, seen) = (None, None, BTreeSet::new(), None);
-        Self { residual, components, culprit, frame, mendable: false, expected, guests, seen }
+        Self { residual, components, culprit, frame, mendable: false, expected, guests, seen, held: Vec::new() }
     }
 }
 

@@ -113,6 +113,7 @@ shutdown: {{ event: e_shutdown, down: [{}], within_s: 5 }}\n{keys}",
                     "goes back",
                     "round for ever",
                     "followed apart",
+                    "comes too late",
                 ];
                 assert!(reasons.iter().any(|why| made.err.contains(why)), "{}", made.err);
                 continue;

@@ -71,16 +71,7 @@ fn one_net_ends_in_the_same_system_and_moves_nothing_to_and_fro() {
         let expected = model.snapshot_some(&names);
         let mut world = World::new(actual.clone(), stack.clone());
         let residual = Arc::new(residual);
-        world.broken.push(Broken {
-            residual,
-            components,
-            culprit: None,
-            frame: None,
-            mendable: false,
-            expected,
-            guests: std::collections::BTreeSet::new(),
-            seen: None,
-        });
+        world.broken.push(Broken::of_nobody(residual, components, expected));
         prop_assert!(diff(&world.as_meant(&world.broken[0]), &model).is_empty(), "what is meant is the model");
         let frame: FrameId = stack.frames()[which as usize % stack.len()].id;
         let Ok(undo) = transaction(&model, &stack, &[Op::Undo(frame)], &context()) else {
