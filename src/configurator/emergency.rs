@@ -6,17 +6,10 @@ use super::repair::By;
 use super::request::Reason;
 use super::running::Running;
 use crate::model::ComponentName;
-use crate::stack::{BeforeEmergency, Broken, FrameId, Residual, World};
+use crate::stack::{BeforeEmergency, Broken, Residual, World};
 use crate::system::{System, touch};
 use std::collections::BTreeSet;
 use std::sync::Arc;
-
-/// An emergency that is not over.
-pub struct Emergency {
-    before: BeforeEmergency,
-    /// Picture and frames as they were looked at last.
-    looked_at: Option<(u64, FrameId, usize)>,
-}
 
 impl Engine {
     /// A safe configuration begins: `without` is the picture without what it interrupts, where that had done anything.
@@ -27,15 +20,13 @@ impl Engine {
         if self.emergency.is_some() || !rests || !broken.is_empty() || self.is_in_part() {
             return;
         }
-        let before = BeforeEmergency::new(stack, without.unwrap_or(system).clone());
-        self.emergency = Some(Emergency { before, looked_at: None });
+        self.emergency = Some(BeforeEmergency::new(stack, without.unwrap_or(system).clone()));
     }
 
     /// A component has failed.
     pub(super) fn fails_in_emergency(&mut self, component: ComponentName) {
         if let Some(emergency) = &mut self.emergency {
-            emergency.before.has_failed(component);
-            emergency.looked_at = None;
+            emergency.has_failed(component);
         }
     }
 
@@ -59,11 +50,8 @@ impl Engine {
         {
             return;
         }
-        let now = (system.revision(), stack.next(), stack.frames().len());
         if stack.safe().next().is_some() {
-            if emergency.looked_at.replace(now) != Some(now)
-                && let Some(frame) = emergency.before.leading_back(system, stack, &self.given.context)
-            {
+            if let Some(frame) = emergency.leading_back(system, stack, &self.given.context) {
                 self.world.stack.replace(frame);
                 self.changed();
             }
@@ -73,7 +61,7 @@ impl Engine {
             return;
         }
         let Some(emergency) = self.emergency.take() else { return };
-        let Some((wanted, difference)) = emergency.before.left(&self.world.system, &self.world.stack) else { return };
+        let Some((wanted, difference)) = emergency.left(&self.world.system, &self.world.stack) else { return };
         if difference.is_empty() {
             return;
         }

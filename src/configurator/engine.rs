@@ -3,7 +3,6 @@
 use super::conditions::{Conditions, Standings};
 use super::confirmations::Confirmations;
 use super::control::{ConfiguratorView, ControlCommand, Moment, QueuedCommand, StoppingBegan, UrgentCommand};
-use super::emergency::Emergency;
 use super::inbox::{Counts, Mail};
 use super::looks::Observing;
 use super::pool::Pool;
@@ -17,7 +16,7 @@ use crate::model::{Ask, ConfigId, Configuration, DeploymentLimits, Ident, RunSta
 use crate::plan::PlanContext;
 use crate::platform::{Platform, PlatformEvent};
 use crate::stack::claims::Claims;
-use crate::stack::{Arrived, Batch, Desk, FrameId, LedDown, Requester, Why, World};
+use crate::stack::{Arrived, Batch, BeforeEmergency, Desk, FrameId, LedDown, Requester, Why, World};
 use crate::time::{Clock, Receiver, RecvError, Time};
 use rustc_hash::{FxHashMap, FxHashSet};
 use smallvec::SmallVec;
@@ -85,7 +84,7 @@ pub(super) struct Engine {
     pub switches: FxHashMap<ConfigId, Vec<Fast>>,
     pub confirmations: Confirmations,
     /// The emergency that is not over.
-    pub emergency: Option<Emergency>,
+    pub emergency: Option<BeforeEmergency>,
     /// Coordinators that are down.
     pub down: BTreeSet<Requester>,
     /// Requests that have begun and were not answered.

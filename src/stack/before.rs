@@ -3,7 +3,7 @@
 //! Each of them takes itself back, whatever it has interrupted and in whatever order several of them came, failed, were late and were let
 //! go of. What all that comes to is held against the picture of before.
 
-use super::{Frame, Inverse, Op, Stack, transaction};
+use super::{Frame, FrameId, Inverse, Op, Stack, transaction};
 use crate::model::{ComponentName, RunState, Step};
 use crate::plan::footprint::{Footprint, Saved, Slot};
 use crate::plan::undo::{DraftStep, in_order};
@@ -19,6 +19,8 @@ pub struct BeforeEmergency {
     system: System,
     /// Components that were faulted then, or have failed since.
     failed: BTreeSet<ComponentName>,
+    /// Picture and frames as they were looked at last.
+    looked_at: Option<(u64, FrameId, usize)>,
 }
 
 impl BeforeEmergency {
@@ -26,7 +28,7 @@ impl BeforeEmergency {
     pub fn new(stack: &Stack, system: System) -> Self {
         let failed = system.graph().node_weights().filter(|node| node.state == RunState::Faulted);
         let failed = failed.map(|node| node.name).collect();
-        Self { frames: stack.frames().to_vec(), system, failed }
+        Self { frames: stack.frames().to_vec(), system, failed, looked_at: None }
     }
 
     /// How the picture differs from that of then, where the very frames of then are in force. None: they are not. What came since may have found
@@ -39,6 +41,7 @@ impl BeforeEmergency {
     /// Nothing is known any more of a component that has failed meanwhile: nobody's undo brings it back.
     pub fn has_failed(&mut self, component: ComponentName) {
         self.failed.insert(component);
+        self.looked_at = None;
     }
 
     /// The steps from one picture to another, but for what is about components that have failed.
@@ -51,8 +54,12 @@ impl BeforeEmergency {
     }
 
     /// The only safe configuration that is left of the emergency, the newest frame of all, as it leads back to there. None: it is not the only
-    /// one, or does so already.
-    pub fn leading_back(&self, system: &System, stack: &Stack, context: &PlanContext) -> Option<Frame> {
+    /// one, or does so already, or that was seen before.
+    pub fn leading_back(&mut self, system: &System, stack: &Stack, context: &PlanContext) -> Option<Frame> {
+        let now = (system.revision(), stack.next(), stack.frames().len());
+        if self.looked_at.replace(now) == Some(now) {
+            return None;
+        }
         let (frame, below) = stack.frames().split_last()?;
         let is_same = below.len() == self.frames.len() && below.iter().zip(&self.frames).all(|(a, b)| a.id == b.id);
         if !frame.safe || frame.partial || !is_same {

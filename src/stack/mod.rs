@@ -37,6 +37,7 @@ mod void;
 mod work;
 mod world;
 
+pub use self::{net::reduce, permanent::may_commit, pile::Pile};
 pub use answer::{Answer, Reason, Residual, TakenAlong};
 pub use batch::{Group, Rules, Told, held, may_apply, take_up};
 pub use before::BeforeEmergency;
@@ -44,9 +45,6 @@ pub use desk::{ActiveBatch, Arrival, Arrived, Desk, GivenUp, Gone, given_up_of};
 pub use effort::{BestEffort, effort};
 pub use keep::keeps_still;
 pub use leave::Barring;
-pub use net::reduce;
-pub use permanent::may_commit;
-pub use pile::Pile;
 pub use prepared::{ResolvedStep, Switch};
 pub use pushes::{PlannedPushes, PushesOf};
 pub use request::{Batch, FrameId, LedDown, Request, Requester, Scope, Stillness, Why};
