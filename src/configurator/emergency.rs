@@ -41,8 +41,8 @@ impl Engine {
     }
 
     /// Where nothing of an emergency is under way, and nothing of what came of it is broken or in force in part: the safe configuration that
-    /// is left of it is seen to lead back. When none is left what differs from before is told, and put right as far as that does not move
-    /// anything. What would move is for who recovers.
+    /// is left of it is seen to lead back. When none is left what differs from before is told, and put right where nothing moves by
+    /// that. Else it is for who recovers.
     pub(super) fn look_at_emergency(&mut self) {
         let World { stack, broken, quarantined, system, .. } = &self.world;
         let Some(emergency) = &mut self.emergency else { return };
