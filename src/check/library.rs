@@ -206,7 +206,7 @@ fn port(declared: &PortType, library: &PortType) -> Departures {
 }
 
 fn property(declared: &PropertyType, library: &PropertyType) -> Departures {
-    let PropertyType { ty, default, min, max, tunable, unit: own_unit, doc: _, origin: _ } = declared;
+    let PropertyType { ty, default, min, max, tunable, raises, unit: own_unit, doc: _, origin: _ } = declared;
     let mut found = Departures::default();
     found.add("the type", (ty, &library.ty), true, ValueType::to_string);
     found.add("the unit", (own_unit, &library.unit), false, unit);
@@ -223,6 +223,7 @@ fn property(declared: &PropertyType, library: &PropertyType) -> Departures {
     }
     // In the order of the run states in which it may be set.
     found.add("tunable", (tunable, &library.tunable), library.tunable < *tunable, Tunable::to_string);
+    found.add("raises", (raises, &library.raises), library.raises && !raises, bool::to_string);
     found
 }
 

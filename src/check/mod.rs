@@ -64,6 +64,7 @@ mod left_unanswered;
 mod let_go;
 mod library;
 mod links;
+mod listeners;
 mod loss;
 mod members;
 mod met;

@@ -1,18 +1,17 @@
 //! Monitors against the deployment: do the things exist that they look at, are they numbers, does somebody listen.
 
+use super::listeners::Listeners;
 use super::universe::Universe;
 use crate::model::codes::{
     MONITOR_EVENT_TAKEN, MONITOR_NO_SUCH_PART, MONITOR_NOT_A_NUMBER, MONITOR_NOT_RUN, MONITOR_UNHEARD, UNKNOWN_ACTIVITY,
 };
 use crate::model::finding::did_you_mean;
 use crate::model::monitor::{Condition, ConditionKind, MONITORS_TYPE, PortSignal, SignalKind, is_monitors};
-use crate::model::statechart::is_internal;
 use crate::model::{
     Change, ComponentName, Deployment, Finding, Findings, Ident, MemberRef, Origin, PortType, ValueType,
 };
 use crate::statechart::Chart;
 use crate::system::MemberClass;
-use std::collections::BTreeSet;
 
 /// What is wrong with the conditions.
 pub fn check(deployment: &Deployment, universe: &Universe) -> Findings {
@@ -68,8 +67,7 @@ fn not_seen(deployment: &Deployment) -> Option<Finding> {
 /// What is wrong with the events.
 pub fn events(deployment: &Deployment, charts: &[&Chart]) -> Findings {
     let mut findings = Vec::new();
-    let heard: BTreeSet<&str> = charts.iter().flat_map(|chart| chart.events()).map(|e| e.as_str()).collect();
-    let confirmed = |event| deployment.configurations.iter().any(|c| c.confirm.is_some_and(|c| c.event == event));
+    let listeners = Listeners::new(deployment, charts);
     for monitor in &deployment.monitors {
         for event in monitor.events() {
             let path = format!("monitors.{}", monitor.name);
@@ -80,15 +78,10 @@ pub fn events(deployment: &Deployment, charts: &[&Chart]) -> Findings {
                     "answers of the configurator and the events of the statechart itself cannot be made by a monitor: \
                      give its event another name, such as `e_aligned`",
                 ));
-            } else if !heard.contains(text) && !confirmed(event) {
+            } else if !listeners.listen_to(event) {
                 let message = format!("nobody listens to `{event}` of the monitor `{}`", monitor.name);
-                findings.push(
-                    Finding::warning(MONITOR_UNHEARD, message).at(monitor.origin).path(path).help(did_you_mean(
-                        text,
-                        "events",
-                        heard.iter().copied().filter(|e| !is_internal(e)),
-                    )),
-                );
+                let finding = Finding::warning(MONITOR_UNHEARD, message).at(monitor.origin).path(path);
+                findings.push(finding.help(listeners.advice(event)));
             }
         }
     }

@@ -16,8 +16,8 @@ use super::state::Failed;
 use super::verdict::CheckVerdict;
 use super::{
     alone, composed, configurations as single, coordinator, coupling, declared, interface, led_on, left_unanswered,
-    library, monitors as watched, moves_back, paths, purity, safety, settings, simulated, slips, types, unasked,
-    undriven, unhandled, universe, unwatched, ways,
+    library, listeners, monitors as watched, moves_back, paths, purity, safety, settings, simulated, slips, types,
+    unasked, undriven, unhandled, universe, unwatched, ways,
 };
 use crate::model::codes::{CLASH, COORD_NO_WAY_DOWN, POST_ON_DESTROYED, PRE_ON_CREATED, TOUCHES_DESTROYED};
 use crate::model::naming::Naming;
@@ -86,6 +86,7 @@ fn run_one(
         let charts = compiled;
         let mut findings = watched::events(deployment, &charts);
         findings.extend(simulated::events(deployment, &charts));
+        findings.extend(listeners::events(deployment, &universe, &charts));
         findings.extend(unwatched::check(deployment, &universe, &charts));
         findings.extend(interface::check(deployment, &universe, &charts));
         if deployment.own.is_none() {

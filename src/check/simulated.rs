@@ -2,12 +2,11 @@
 //! components exist, does somebody listen.
 
 use super::links::links;
+use super::listeners::Listeners;
 use super::universe::Universe;
 use crate::model::codes::{SIMULATED_NOT_USED, SIMULATED_UNHEARD, SIMULATED_UNKNOWN_STEP, TYPE_NO_EVENT};
 use crate::model::finding::did_you_mean;
-use crate::model::{
-    ChangeKind, ComponentName, Deployment, Finding, Findings, MemberRef, Origin, SimulatedReaction, StepFault,
-};
+use crate::model::{ChangeKind, ComponentName, Deployment, EventName, Finding, Findings, MemberRef, Origin, StepFault};
 use crate::statechart::Chart;
 use crate::system::MemberClass;
 use std::collections::BTreeSet;
@@ -30,7 +29,7 @@ pub fn check(deployment: &Deployment, universe: &Universe) -> Findings {
     for (i, reaction) in deployment.reactions.iter().enumerate() {
         let mut wrong = step(&reaction.after, reaction.origin, universe);
         if universe.of(reaction.component).is_empty() {
-            wrong.push(universe.unknown(reaction.component, reaction.origin));
+            wrong.push(universe.unknown_anywhere(reaction.component, reaction.origin));
         }
         findings.extend(wrong.into_iter().map(|finding| finding.path(format!("simulated.reactions[{i}]"))));
     }
@@ -124,10 +123,7 @@ fn never_done(fault: &StepFault, deployment: &Deployment, universe: &Universe) -
 
 /// Events that nobody waits for.
 pub fn events(deployment: &Deployment, charts: &[&Chart]) -> Findings {
-    let heard: BTreeSet<&str> = charts.iter().flat_map(|chart| chart.events()).map(|event| event.as_str()).collect();
-    let confirms = |r: &SimulatedReaction| {
-        deployment.configurations.iter().any(|c| c.confirm.is_some_and(|confirm| confirm.event == r.raise))
-    };
+    let listeners = Listeners::new(deployment, charts);
     let is_told = |event: &str| deployment.looks_like_answer(event) || deployment.names_configuration(event);
     let forged = deployment.reactions.iter().enumerate().filter(|(_, reaction)| is_told(reaction.raise.as_str()));
     let forged = forged.filter_map(|(i, reaction)| {
@@ -140,17 +136,14 @@ pub fn events(deployment: &Deployment, charts: &[&Chart]) -> Findings {
                 .help("let it raise an event that a component of that type raises"),
         )
     });
-    let deaf = |r: &&SimulatedReaction| {
-        let event = r.raise.as_str();
-        !is_told(event) && !heard.contains(event) && !confirms(r)
-    };
-    let told = deployment.reactions.iter().enumerate().filter(|(_, reaction)| deaf(reaction));
+    let deaf = |event: EventName| !is_told(event.as_str()) && !listeners.listen_to(event);
+    let told = deployment.reactions.iter().enumerate().filter(|(_, reaction)| deaf(reaction.raise));
     let unheard = told.map(|(i, reaction)| {
         let message = format!("nobody listens to `{}` of `{}`", reaction.raise, reaction.component);
         Finding::warning(SIMULATED_UNHEARD, message)
             .at(reaction.origin)
             .path(format!("simulated.reactions[{i}]"))
-            .help(did_you_mean(reaction.raise.as_str(), "events", heard.iter().copied()))
+            .help(listeners.advice(reaction.raise))
     });
     forged.chain(unheard).collect()
 }
@@ -209,7 +202,7 @@ fn whole(at: Origin, verb: &str, rest: &str, universe: &Universe) -> Findings {
     };
     let creations = universe.of(name);
     if creations.is_empty() {
-        return vec![universe.unknown(name, at)];
+        return vec![universe.unknown_anywhere(name, at)];
     }
     match words.next() {
         None => Vec::new(),
@@ -230,7 +223,7 @@ fn member(at: Origin, verb: &str, part: MemberClass, operand: &str, universe: &U
         return vec![unreadable(at, operand, "a member of a component", &format!("{verb} radio.channel"))];
     };
     if universe.of(member.component).is_empty() {
-        return vec![universe.unknown(member.component, at)];
+        return vec![universe.unknown_anywhere(member.component, at)];
     }
     universe.lacks(part, member, at).into_iter().collect()
 }

@@ -1,5 +1,6 @@
 //! Events that are nearly, but not quite, ones that there are: an unknown one is no error by itself, since operators may raise any.
 
+use super::listeners::named;
 use super::universe::Universe;
 use crate::model::codes::COORD_NEAR_EVENT;
 use crate::model::finding::{closest, did_you_mean, nearest};
@@ -49,6 +50,7 @@ impl<'a> KnownEvents<'a> {
         let own = universe.components().filter(|component| !component.as_str().contains('/'));
         let types = own.flat_map(|component| universe.of(component)).filter_map(|made| made.description.as_deref());
         let by_components = types.flat_map(|ty| ty.raises.keys()).map(|event| event.as_str()).collect();
+        raised.extend(named(deployment, universe).iter().map(|named| named.event.as_str()));
         let accepted = deployment.interface.accepts.iter().map(|(event, _)| event.as_str()).collect();
         let declared = deployment.safety.iter().chain(&deployment.emits).map(|(event, _)| *event).collect();
         Self { deployment, raised, by_components, accepted, declared, confirms, told, waited_for }

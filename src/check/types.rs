@@ -1,10 +1,13 @@
 //! The component types that a deployment declares.
 
 use crate::model::codes::{
-    TYPE_CIRCLE, TYPE_EXCLUSIVE, TYPE_NO_EVENT, TYPE_UNKNOWN_OPERATION, TYPE_UNKNOWN_TYPE, TYPE_WITHOUT_CODE,
+    TYPE_BAD_TYPE, TYPE_CIRCLE, TYPE_EXCLUSIVE, TYPE_NO_EVENT, TYPE_UNKNOWN_OPERATION, TYPE_UNKNOWN_TYPE,
+    TYPE_WITHOUT_CODE,
 };
 use crate::model::finding::did_you_mean;
-use crate::model::{Catalogue, ComponentType, Deployment, Effect, Finding, Findings, Ident, Tunable, TypeName};
+use crate::model::{
+    Catalogue, ComponentType, Deployment, Effect, Finding, Findings, Ident, PropertyType, Tunable, TypeName, ValueType,
+};
 use std::collections::{BTreeSet, VecDeque};
 
 /// What is wrong with the declared types: names of other types and of operations that are not there.
@@ -70,9 +73,21 @@ pub fn check(deployment: &Deployment, catalogue: &Catalogue) -> Findings {
         }
     }
     findings.extend(deployment.types.iter().filter_map(|ty| exclusive(deployment, ty)));
+    findings.extend(deployment.types.iter().flat_map(nameless));
     findings.extend(cycles(deployment, catalogue));
     findings.extend(without_code(deployment, catalogue));
     findings
+}
+
+/// Properties that are to name events, and are of another type than names.
+fn nameless(ty: &ComponentType) -> impl Iterator<Item = Finding> {
+    let is_nameless = |(_, of): &(&Ident, &PropertyType)| of.raises && of.ty != ValueType::Str;
+    ty.properties.iter().filter(is_nameless).map(|(name, of)| {
+        let message = format!("`{name}` is a {}, and only a string can be the name of an event", of.ty);
+        Finding::error(TYPE_BAD_TYPE, message)
+            .at(of.origin)
+            .help(format!("write `{name}: {{ type: string, raises: true }}`, or leave `raises` out"))
+    })
 }
 
 /// What is held for itself, by a property that cannot say what.

@@ -1,7 +1,7 @@
 //! All components that any configuration creates: what names in configurations may mean at all.
 
 use crate::model::codes::UNKNOWN_COMPONENT;
-use crate::model::finding::did_you_mean;
+use crate::model::finding::{did_you_mean, did_you_mean_path};
 use crate::model::{
     Catalogue, ChangeKind, ComponentName, ComponentType, ConfigId, Deployment, Effect, Finding, MemberRef, Origin,
     TypeName,
@@ -136,6 +136,13 @@ impl Universe {
             Effect::Undo(undo) => Some(operation.component.member(*undo)),
             _ => None,
         })
+    }
+
+    /// The same of one that may be at any depth: what goes wrong is said of the platform's components.
+    pub fn unknown_anywhere(&self, component: ComponentName, at: Origin) -> Finding {
+        let mut known: Vec<&str> = self.components.keys().map(ComponentName::as_str).collect();
+        known.sort_unstable();
+        self.unknown(component, at).help(did_you_mean_path(component.as_str(), "components", known))
     }
 
     /// The finding that nothing creates a component of that name.

@@ -6,17 +6,19 @@ use super::output::{Output, Style, Table, text_columns};
 use super::{CommandContext, CommandFailure, CommandResult, Run};
 use crate::diagnostics::wrapped;
 use crate::lang::schema::{self, ReferenceEntry};
+use crate::model::Verdict;
 use crate::model::codes::{self, CLI_UNKNOWN_CODE, PAGES, Page};
 use crate::model::finding::{and_also, did_you_mean, nearest};
 use serde::Serialize;
+use serde_json::json;
 
 /// Explain a finding (what happened, why it is refused, what to do), or a key of the files (what it means, its form, its unit, its
-/// bounds, what holds without it, how it is written). Behind `--` also a flag: `davit explain -- --set`.
+/// bounds, what holds without it, how it is written), or an answer to a request (`ID.lost`). Behind `--` also a flag: `davit explain -- --set`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The finding's code, as `conf::unknown_component` or `davit::conf::unknown_component`; a key, as `timeout` or
-    /// `configuration.timeout` or `type.ports.unit`; a table, as `configuration`; a word, as `above` or `e_after`. Without one, all codes
-    /// are listed.
+    /// `configuration.timeout` or `type.ports.unit`; a table, as `configuration`; a word, as `above` or `e_after`; an answer, as `lost` or
+    /// `ID.undo.failed`. Without one, all codes are listed.
     #[arg(value_name = "CODE|KEY")]
     what: Option<String>,
     /// List all keys, tables and words instead of the codes.
@@ -105,6 +107,23 @@ fn one(out: &Output, what: &str, json: bool) -> Result<(), CommandFailure> {
         return flag(out, what, json);
     }
     let entries = schema::about(what);
+    let answer = match Verdict::split(what) {
+        // A key may be written like one: `deploy.failed`.
+        Some((_, ending)) => Verdict::ended(&ending[1..]).filter(|_| entries.is_empty()),
+        None => Verdict::ended(what),
+    };
+    if let Some(verdict) = answer {
+        let alone = entries.is_empty() && called(what).len() != 1;
+        match (json, alone) {
+            (true, true) => out.json(&json!({ "answer": answer_name(verdict), "text": verdict.meaning() })),
+            (true, false) => {}
+            (false, true) => out.text(shown_answer(out, verdict)),
+            (false, false) => out.line(shown_answer(out, verdict)),
+        }
+        if alone {
+            return Ok(());
+        }
+    }
     if entries.is_empty() {
         // Of a code only what is behind its area is remembered.
         let called: Vec<&str> = called(what);
@@ -124,6 +143,19 @@ fn one(out: &Output, what: &str, json: bool) -> Result<(), CommandFailure> {
         out.text(shown(out, entry));
     }
     Ok(())
+}
+
+/// Whose answer it is, as files write it: `ID.undo.failed`.
+fn answer_name(verdict: Verdict) -> String {
+    format!("ID{}", verdict.ending(false))
+}
+
+fn shown_answer(out: &Output, verdict: Verdict) -> String {
+    format!(
+        "{}: an answer\n{}",
+        out.paint(Style::Name, answer_name(verdict)),
+        wrapped(verdict.meaning(), text_columns(), 2)
+    )
 }
 
 /// A flag: which commands have it, and what it means there.
@@ -166,7 +198,7 @@ fn unknown(what: &str) -> CommandFailure {
     let (message, list) = match what.contains("::") {
         true => (format!("there is no finding with the code `{what}`"), "`davit explain` lists all codes"),
         false => (
-            format!("`{what}` is neither a code of a finding nor a key of a file"),
+            format!("`{what}` is neither a code of a finding nor a key of a file, nor an answer"),
             "`davit explain` lists all codes, `davit explain --keys` all keys",
         ),
     };

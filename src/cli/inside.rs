@@ -112,8 +112,20 @@ impl Region {
     /// A step as its text has it: behind the verb, and behind an arrow, stands a name.
     pub fn step(&self, text: &str) -> String {
         let named = names_of(text);
-        let word = |(at, word): (usize, &str)| if named.contains(&at) { self.name(word) } else { word.to_owned() };
-        text.split(' ').enumerate().map(word).collect::<Vec<_>>().join(" ")
+        let mut before = "";
+        let mut words = Vec::new();
+        for (at, word) in text.split(' ').enumerate() {
+            words.push(match named.contains(&at) {
+                true => self.name(word),
+                // A type that the file's own monitors are of; others have no path.
+                false if before == ":" && at == named[0] + 2 => {
+                    names::local_to(word, &self.path).unwrap_or(word).to_owned()
+                }
+                false => word.to_owned(),
+            });
+            before = word;
+        }
+        words.join(" ")
     }
 
     /// Whether a step is about something of it.
@@ -187,6 +199,8 @@ mod tests {
         assert_eq!(left.step(step), "connect Drive.pose -> /right/Drive.ref (data)");
         assert_eq!(left.step("undo: stop left/Drive"), "undo: stop Drive");
         assert_eq!(left.step("property_set left/Drive.name = \"left/x\""), "property_set Drive.name = \"left/x\"");
+        assert_eq!(left.step("create left/Seen : left/davit.Monitors"), "create Seen : davit.Monitors");
+        assert_eq!(left.step("create left/Drive : my.Drive"), "create Drive : my.Drive");
         assert!(left.is_in_step(step) && region("right").is_in_step(step) && !left.is_in_step("start right/Drive"));
     }
 

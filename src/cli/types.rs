@@ -173,7 +173,7 @@ fn one(out: &Output, ty: &ComponentType) {
             default,
             unit,
             limits,
-            property.tunable.to_string(),
+            property.tunable.to_string() + if property.raises { ", raises" } else { "" },
             property.doc.clone(),
         ]);
     }

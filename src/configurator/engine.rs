@@ -356,6 +356,7 @@ impl Engine {
             PlatformEvent::Returned { component, .. } => {
                 self.suspects.report(component);
                 self.returned = CameBack::Now;
+                self.observing.at_once(self.given.clock.now());
                 self.note_quarantine();
             }
             PlatformEvent::Raised { .. } => {}

@@ -140,6 +140,8 @@ impl Resolve<'_> {
                 if !of.activities.contains_key(activity) {
                     let message = format!("there is no activity `{activity}` in {whose}");
                     let known = of.activities.keys().map(Ident::as_str);
+                    // What is of a subsystem there is given on there.
+                    let known = known.filter(|known| !known.contains('/'));
                     let help = did_you_mean(activity.as_str(), "activities", known);
                     let finding = Finding::error(codes::COMPOSE_UNKNOWN, message).at(subsystem.origin);
                     cx.report(finding.help(help));

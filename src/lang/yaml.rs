@@ -53,6 +53,20 @@ pub fn read(cx: &mut Cx, reading: Reading) -> Option<Node> {
     }
 }
 
+/// The element of an array in a line that stands there without quotes (`Joint.y[0]`).
+fn bare_element(line: &str) -> Option<&str> {
+    let is_named = |c: char| c.is_alphanumeric() || matches!(c, '_' | '.' | '/');
+    line.match_indices('[').find_map(|(open, _)| {
+        let begin = line[..open]
+            .rfind(|c| !is_named(c))
+            .map_or(0, |at| at + line[at..].chars().next().map_or(1, char::len_utf8));
+        let close = open + line[open..].find(']')?;
+        let is_number = close > open + 1 && line[open + 1..close].bytes().all(|c| c.is_ascii_digit());
+        let is_quoted = line[..begin].ends_with(['"', '\'']);
+        (is_number && line[begin..open].contains('.') && !is_quoted).then(|| &line[begin..=close])
+    })
+}
+
 type ReadResult = Result<(), Box<Finding>>;
 
 fn small(n: usize) -> u32 {
@@ -125,10 +139,13 @@ impl YamlReader<'_> {
         let tab = self.cx.sources.file(self.reading.file).line(small(marker.line()));
         let line = &self.cx.sources.file(self.reading.file).text[tab];
         let help = if line.trim_start_matches(' ').starts_with('\t') {
-            "YAML is indented with blanks, never with tabs"
+            "YAML is indented with blanks, never with tabs".to_owned()
+        } else if let Some(part) = bare_element(line) {
+            format!("the part of a port stands in quotes in YAML: `\"{part}\"`")
         } else {
             "see what stands just before this place: a name without its `:` at the end of a line, a bracket or quote left open, a missing blank after `:`, or \
              indentation that does not fit"
+                .to_owned()
         };
         Box::new(Finding::error(code, format!("this is not YAML: {}", error.info())).at(origin).help(help))
     }

@@ -161,7 +161,7 @@ codes! {
     // ---- deployment and types --------------------------------------------------------------------------------------
     TYPE_BAD_TYPE = "type::bad_type", "this is not a type of values",
         "Types are `bool`, `int`, `float`, `string`, for ports also `event`, arrays `\"float[3]\"` and `\"float[]\"` (in \
-         quotes, since YAML has brackets of its own), and records `{x: float, y: float}`. Anything else cannot be \
+         quotes, since YAML has brackets of its own), and records `{x: float, y: float}`; a property that names an event (`raises: true`) is a `string`. Anything else cannot be \
          checked, so it is refused.";
     TYPE_BAD_DEFAULT = "type::bad_default", "a property's default or limits contradict its type",
         "The default of a property must be of its type and lie within `min` and `max`, and `min` may not exceed `max`: \
@@ -977,6 +977,10 @@ codes! {
     MONITOR_UNHEARD = "monitor::unheard", "nobody listens to an event of a monitor",
         "No transition of the coordinator waits for the event and no configuration is confirmed by it, so the monitor \
          watches in vain. The name may be misspelt in one of the two places.";
+    CONF_EVENT_UNHEARD = "conf::event_unheard", "nobody listens to an event that a value names",
+        "The property is one whose value is the name of an event that the component raises (`raises: true` in its type). No transition of the \
+         coordinator waits for this one and no configuration is confirmed by it, or it is of a name that only Davit itself tells things by. It may be misspelt in one of the two places; where nothing is to be raised \
+         leave the value out, or give \"\".";
     // ---- the simulated platform ------------------------------------------------------------------------------------
     SIMULATED_UNKNOWN_STEP = "simulated::unknown_step", "a reaction or a fault of the simulated platform names no step",
         "`simulated: { reactions: [...] }` says what components raise by themselves after a step was done, `faults: [...]` \

@@ -3,7 +3,7 @@
 use super::finding::Origin;
 use super::injection::InjectionType;
 use super::monitor::{Condition, SELF, is_monitors};
-use super::names::{ComponentName, EventName, Ident, TypeName};
+use super::names::{ComponentName, EventName, Ident, NameError, TypeName};
 use super::resource::Resource;
 use super::run_state::RunState;
 use super::value::{FitError, Value, ValueType};
@@ -192,6 +192,9 @@ pub struct PropertyType {
     pub max: Option<f64>,
     /// When it may be set.
     pub tunable: Tunable,
+    /// Whether its value is the name of an event that the component raises; empty: none.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub raises: bool,
     /// The unit, if it states one.
     pub unit: Option<Arc<str>>,
     /// What it is.
@@ -217,6 +220,9 @@ pub enum ValueError {
         /// The largest allowed.
         max: Option<f64>,
     },
+    /// Not the name of an event, as the value of a property that is one.
+    #[error(transparent)]
+    Event(#[from] NameError),
 }
 
 impl ValueError {
@@ -227,6 +233,9 @@ impl ValueError {
             Self::Range { min: Some(min), .. } => format!("give {min} or more"),
             Self::Range { max, .. } => format!("give {} or less", max.unwrap_or(f64::INFINITY)),
             Self::Fit(_) => format!("give a value of the type {ty}"),
+            Self::Event(_) => {
+                "give the name of the event that is to be raised, such as `e_seen`, or \"\" for none".to_owned()
+            }
         }
     }
 }
@@ -242,15 +251,35 @@ fn outside(value: f64, min: Option<f64>, max: Option<f64>) -> String {
 impl PropertyType {
     /// One of which nothing else is said.
     pub fn new(ty: ValueType, tunable: Tunable) -> Self {
-        Self { ty, default: None, min: None, max: None, tunable, unit: None, doc: String::new(), origin: Origin::NONE }
+        let (default, min, max, unit, raises) = (None, None, None, None, false);
+        Self { ty, default, min, max, tunable, raises, unit, doc: String::new(), origin: Origin::NONE }
     }
 
-    /// `value` as a value of this property: of its type, within its limits.
+    /// `value` as a value of this property: of its type, within its limits, an event's name where it is one.
     ///
     /// # Errors
     /// `ValueError`, naming the number or element at fault.
     pub fn fit(&self, value: Value) -> Result<Value, ValueError> {
-        fit_within(value, &self.ty, self.min, self.max)
+        let value = fit_within(value, &self.ty, self.min, self.max)?;
+        self.names_event(&value)?;
+        Ok(value)
+    }
+
+    /// Whether `value` is one of this property as it is; where it is not, [`fit`](Self::fit) says why.
+    pub fn takes(&self, value: &Value) -> bool {
+        let mut within = true;
+        if self.min.is_some() || self.max.is_some() {
+            value
+                .for_each_number(&mut |n| within &= self.min.is_none_or(|m| n >= m) && self.max.is_none_or(|m| n <= m));
+        }
+        within && value.is_of(&self.ty) && self.names_event(value).is_ok()
+    }
+
+    fn names_event(&self, value: &Value) -> Result<(), NameError> {
+        match value {
+            Value::Str(name) if self.raises && !name.is_empty() => EventName::new(name).map(drop),
+            _ => Ok(()),
+        }
     }
 }
 

@@ -1,7 +1,7 @@
 //! A deployment with its subsystems (semantics: *Composition*): who is where.
 
 use super::deployment::{Coordinator, Deployment, Subsystem};
-use super::names::{ConfigId, EventName, Ident};
+use super::names::{ConfigId, EventName, Ident, MemberRef};
 use super::subsystem::{IGNORED, SubsystemStanding};
 use super::within::Within;
 
@@ -60,6 +60,13 @@ impl Deployment {
         let Some((path, word)) = event.rsplit_once('/') else { return false };
         self.subsystem(path).is_some()
             && (word.ends_with(IGNORED) || SubsystemStanding::WORDS.iter().any(|(own, _)| *own == word))
+    }
+
+    /// What a subsystem exports under a name (`line.speed`), by the name that it has here (`line/Belt.slope`).
+    pub fn exported(&self, subsystem: &str, name: &str) -> Option<MemberRef> {
+        let (path, of) = self.all_subsystems().into_iter().find(|(path, _)| path.as_str() == subsystem)?;
+        let (_, export) = of.own.interface.exports.iter().find(|(own, _)| own.as_str() == name)?;
+        Some(export.of.component.within(path).member(export.of.member))
     }
 
     /// What is written in its own file alone: with subsystems the rest of it is made of theirs.

@@ -190,6 +190,59 @@ impl Verdict {
         }
     }
 
+    /// The one that an answer ends with, written without its point (`undo.failed`). A bare `failed` is a push's.
+    pub fn ended(ending: &str) -> Option<Self> {
+        let all = [
+            (Self::Ok, false),
+            (Self::Failed, false),
+            (Self::Broken, false),
+            (Self::Cancelled, false),
+            (Self::Undone, false),
+            (Self::UndoFailed, false),
+            (Self::UndoBroken, false),
+            (Self::Reverted, false),
+            (Self::Lost, false),
+            (Self::Undone, true),
+        ];
+        all.into_iter().find(|(verdict, bare)| &verdict.ending(*bare)[1..] == ending).map(|(verdict, _)| verdict)
+    }
+
+    /// What it means for who asked (semantics: *Requests*).
+    pub fn meaning(self) -> &'static str {
+        match self {
+            Self::Ok => "The configuration is applied, and its frame is on the stack. Undo it with `ID.undo`.",
+            Self::Failed => {
+                "The configuration is not applied: it was refused, or a step failed, and what was done is taken back. The system is as before."
+            }
+            Self::Broken => {
+                "A step failed, and what was done could not be taken back, or not unasked: the system is neither as before nor as asked for. \
+                 What remains is told (`davit drift`); the undo of the configuration, `davit recover` or a shutdown lead on."
+            }
+            Self::Cancelled => {
+                "The request was overtaken before it began, by something `safe` or by its own undo: nothing of it was done."
+            }
+            Self::Undone => {
+                "The configuration is taken back, and its frame is off the stack: so it is also where none was in force. An `undo` that names none \
+                 is answered `undo.done`."
+            }
+            Self::UndoFailed => {
+                "The configuration is not taken back: it was refused, or a step failed. Nothing is changed, and its frame stays. An `undo` that names none \
+                 is answered `undo.failed`."
+            }
+            Self::UndoBroken => {
+                "The configuration is taken back in part: what remains is told (`davit drift`), and its undo may be asked for again. An `undo` that names none \
+                 is answered `undo.broken`."
+            }
+            Self::Reverted => {
+                "The configuration was applied, and is taken back: the event that was to confirm it (`confirm`) did not come in time. Nobody asked for that."
+            }
+            Self::Lost => {
+                "What the configuration stands for is no longer so: a component of it failed, or was seen otherwise than it was left. It stays on the stack, and \
+                 is told once, to the coordinator that had asked for it."
+            }
+        }
+    }
+
     /// What an event tells about that is spelt like an answer (a configuration, `undo`), with how it ends.
     pub fn split(event: &str) -> Option<(&str, &'static str)> {
         let told = |ending: &&'static str| event.strip_suffix(*ending).map(|subject| (subject, *ending));

@@ -250,6 +250,35 @@ pub fn did_you_mean<'a>(name: &str, what: &str, known: impl IntoIterator<Item = 
     format!("known {what}: {}{more}", shown.join(", "))
 }
 
+/// The same of something that may be in a subsystem: a name without the path means those of that name inside, and the path of a subsystem what
+/// is in it.
+pub fn did_you_mean_path<'a>(name: &str, what: &str, known: impl IntoIterator<Item = &'a str>) -> String {
+    let known: Vec<&str> = known.into_iter().collect();
+    let within = |path: &str| path.strip_prefix(name).is_some_and(|rest| rest.starts_with('/'));
+    let inside: Vec<&str> = known.iter().copied().filter(|path| within(path)).collect();
+    if !inside.is_empty() {
+        return format!("`{name}` is a subsystem; {}", did_you_mean("", what, inside));
+    }
+    let meant = meant(name, known.iter().copied());
+    match meant.is_empty() {
+        true => did_you_mean(name, what, known),
+        false => format!("did you mean `{}`?", meant.join("` or `")),
+    }
+}
+
+/// Which of some known names may be meant by one that is none of them, also by what they are called in their subsystems.
+pub fn meant<'a>(name: &str, known: impl Iterator<Item = &'a str> + Clone) -> Vec<&'a str> {
+    let last = |path: &'a str| path.rsplit_once('/').map_or(path, |(_, last)| last);
+    let of = |word: &str| -> Vec<&str> { known.clone().filter(|path| last(path) == word).take(3).collect() };
+    match of(name) {
+        none if none.is_empty() => match nearest(name, known.clone()) {
+            Some(near) => vec![near],
+            None => nearest(name, known.clone().map(last)).map(of).unwrap_or_default(),
+        },
+        inside => inside,
+    }
+}
+
 /// A help with more behind it, which begins a sentence of its own behind a question.
 pub fn and_also(help: &str, more: &str) -> String {
     let mut letters = more.chars();

@@ -77,6 +77,7 @@ pub(super) struct MemberWords {
     pub(super) min: Option<f64>,
     pub(super) max: Option<f64>,
     pub(super) tunable: Tunable,
+    pub(super) raises: bool,
     pub(super) buffered: bool,
     pub(super) required: bool,
     pub(super) effect: Option<Effect>,
@@ -401,8 +402,10 @@ impl<C> Description<C> {
         let words = std::mem::take(&mut self.words);
         let name = ident(name);
         let (min, max) = limits.unzip();
-        let (min, max, unit, doc) = (words.min.or(min), words.max.or(max), words.unit, words.doc);
-        let mut property = PropertyType { min, max, unit, doc, ..PropertyType::new(ty, words.tunable) };
+        let (min, max) = (words.min.or(min), words.max.or(max));
+        let MemberWords { raises, unit, doc, .. } = words;
+        assert!(!raises || ty == ValueType::Str, "{}: `{name}` names an event, and is no text", self.ty.name);
+        let mut property = PropertyType { min, max, raises, unit, doc, ..PropertyType::new(ty, words.tunable) };
         property.default = default.map(|value| match property.fit(value) {
             Ok(value) => value,
             Err(error) => panic!("{}: the default of `{name}`: {error}", self.ty.name),

@@ -94,6 +94,12 @@ impl<C: Component> Builder<C> {
         self.words(|w| w.tunable = tunable)
     }
 
+    /// The value of a property, a text, is the name of an event that the component raises; empty: none. `davit check` then warns of one that
+    /// nobody listens to.
+    pub fn raises(&mut self) -> &mut Self {
+        self.words(|w| w.raises = true)
+    }
+
     /// The in-port is read as a queue: it takes only buffered connections, any number of them.
     pub fn buffered(&mut self) -> &mut Self {
         self.words(|w| w.buffered = true)

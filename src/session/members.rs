@@ -3,7 +3,7 @@
 use super::carried::shown;
 use super::{Session, Unanswered};
 use crate::limits;
-use crate::model::finding::did_you_mean;
+use crate::model::finding::{did_you_mean, did_you_mean_path};
 use crate::model::monitor::PortSignal;
 use crate::model::{
     Ask, ChangeKind, ComponentName, ComponentType, ConfigId, Configuration, Direction, Ident, MemberRef, OperatorMay,
@@ -169,7 +169,11 @@ impl Session {
             .and_then(|(known, it)| Some((*known, self.platform().catalogue().get(it.ty)?)))
             .ok_or_else(|| {
                 let known = system.components.keys().map(ComponentName::as_str);
-                no(format!("there is no component `{of}`"), did_you_mean(of, "components", known))
+                let help = match self.deployment().exported(of, member) {
+                    Some(own) => format!("`{name}` is `{own}` here"),
+                    None => did_you_mean_path(of, "components", known),
+                };
+                no(format!("there is no component `{of}`"), help)
             })?;
         if let Some((known, property)) = ty.properties.iter().find(|(known, _)| known.as_str() == member) {
             let (ty, unit) = (property.ty.clone(), property.unit.clone());

@@ -2,7 +2,7 @@
 
 use super::Session;
 use crate::limits::{EVENTS_UNLISTED, UNLISTED_BYTES};
-use crate::model::finding::did_you_mean;
+use crate::model::finding::{did_you_mean, did_you_mean_path};
 use crate::model::names::NameError;
 use crate::model::{Ask, Code, EventName, Verdict, codes};
 use crate::time::lock;
@@ -113,13 +113,7 @@ impl Session {
         }
         let events = self.events();
         let waited_for = events.iter().map(EventName::as_str).filter(|event| self.may_raise(event).is_ok());
-        let inner: Vec<&str> =
-            waited_for.clone().filter(|event| event.rsplit_once('/').is_some_and(|(_, own)| own == name)).collect();
-        match inner.is_empty() {
-            true => did_you_mean(name, "events", waited_for),
-            // It is one of a subsystem, or of several.
-            false => format!("did you mean `{}`?", inner.join("` or `")),
-        }
+        did_you_mean_path(name, "events", waited_for)
     }
 
     /// The event that a text from outside names. Asked before it becomes a name: names are kept for ever.

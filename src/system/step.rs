@@ -330,14 +330,7 @@ fn connect_allowed(from: MemberRef, to: MemberRef, policy: Policy, view: &impl V
 
 /// Why a property cannot have this value, which is of its type already or can be of none.
 pub(crate) fn bad_value(slot: MemberRef, declared: &PropertyType, value: &Value) -> Option<Violation> {
-    let bounded = declared.min.is_some() || declared.max.is_some();
-    let mut within = true;
-    if bounded {
-        value.for_each_number(&mut |n| {
-            within &= declared.min.is_none_or(|m| n >= m) && declared.max.is_none_or(|m| n <= m);
-        });
-    }
-    if within && value.is_of(&declared.ty) {
+    if declared.takes(value) {
         return None;
     }
     let reason = match declared.fit(value.clone()) {
@@ -348,6 +341,7 @@ pub(crate) fn bad_value(slot: MemberRef, declared: &PropertyType, value: &Value)
         (Some(min), Some(max)) => format!(", from {min} to {max}"),
         (Some(min), None) => format!(", at least {min}"),
         (None, Some(max)) => format!(", at most {max}"),
+        (None, None) if declared.raises => ", the name of an event or \"\"".to_owned(),
         (None, None) => String::new(),
     };
     let wanted = wanted(&declared.ty, declared.unit.as_deref()) + &bounds;

@@ -25,6 +25,7 @@ mod flat_coupling;
 mod flat_plans;
 mod follow;
 mod inside;
+mod listeners;
 mod never_entered;
 mod overtaken;
 mod pointed;

@@ -63,6 +63,21 @@ fn explain_lists_and_explains_every_code() {
 }
 
 #[test]
+fn explain_tells_what_an_answer_means() {
+    for ending in davit::model::Verdict::ENDINGS {
+        let answer = format!("work{ending}");
+        let told = at_home(&["explain", &answer, "--json"]).json();
+        let name = told["answer"].as_str().unwrap_or_default();
+        assert!(name.ends_with(ending) || (name, ending) == ("ID.undone", ".done"), "{answer}: {told}");
+    }
+    assert!(at_home(&["explain", "lost"]).out.starts_with("ID.lost: an answer"));
+    // What else is called so is told behind it, and a key by its whole name is that key.
+    let failed = at_home(&["explain", "failed"]).out;
+    assert!(failed.starts_with("ID.failed: an answer") && failed.contains("deploy.failed"), "{failed}");
+    assert!(at_home(&["explain", "deploy.failed"]).out.starts_with("deploy.failed"));
+}
+
+#[test]
 fn explain_tells_what_a_key_means() {
     for (slip, meant) in [("configuration.tmeout", "configuration.timeout"), ("type.ports.unti", "type.ports.unit")] {
         let unknown = at_home(&["explain", slip]);

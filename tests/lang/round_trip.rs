@@ -381,7 +381,9 @@ fn component_type() -> impl Strategy<Value = ComponentType> {
         any_text().prop_map(|v| (ValueType::Str, None, None, Some(Value::str(&v)))),
     ];
     let property = (limits, tunable, unit(), any_text()).prop_map(|((ty, min, max, default), tunable, unit, doc)| {
-        PropertyType { ty, default, min, max, tunable, unit, doc, origin: Origin::NONE }
+        // What names an event has an event's name for its default.
+        let raises = ty == ValueType::Str && default.is_none();
+        PropertyType { ty, default, min, max, tunable, raises, unit, doc, origin: Origin::NONE }
     });
     let effect = prop_oneof![Just(Effect::None), Just(Effect::Irreversible), ident().prop_map(Effect::Undo)];
     let settled = option::weighted(0.2, condition());

@@ -5,7 +5,7 @@ use crate::app::Checked;
 use crate::app::start::rule;
 use crate::check;
 use crate::limits;
-use crate::model::finding::did_you_mean;
+use crate::model::finding::{did_you_mean, did_you_mean_path};
 use crate::model::{ComponentName, ComponentType, Direction, FaultKind, Ident, Origin, StepFault, TypeName};
 use crate::platform::simulated::Simulated;
 use std::collections::BTreeSet;
@@ -74,7 +74,7 @@ impl ScriptFaults {
         if name.is_some_and(|name| known.contains(&name)) {
             return Err(error(format!("`{component}` is not there now, and cannot fail")));
         }
-        let help = did_you_mean(component, "components", known.iter().map(ComponentName::as_str));
+        let help = did_you_mean_path(component, "components", known.iter().map(ComponentName::as_str));
         Err(error(format!("there is no component `{component}`: {help}")))
     }
 

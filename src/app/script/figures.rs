@@ -96,6 +96,11 @@ pub(super) fn add(host: &SharedHost, lua: &Lua, table: Table, bounded: bool) -> 
     if [min, max].into_iter().flatten().any(f64::is_nan) {
         return Err(error("`expect`: a bound is not a number, and nothing would ever keep it"));
     }
+    if let (Some(least), Some(most)) = (min, max)
+        && least > most
+    {
+        return Err(error(format!("`expect`: `min` ({least}) is above `max` ({most}): no value could keep both")));
+    }
     // What is not a number keeps no bound.
     let within = min.is_none_or(|min| value >= min) && max.is_none_or(|max| value <= max);
     let ok = within && !(bounded && value.is_nan());

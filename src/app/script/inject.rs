@@ -3,7 +3,7 @@
 
 use super::{SharedHost, clock, error, figures, session, values};
 use crate::limits;
-use crate::model::finding::{count, did_you_mean};
+use crate::model::finding::{count, did_you_mean_path};
 use crate::model::injection::NoInjection;
 use crate::model::{ComponentName, ComponentType, Injection, Value};
 use crate::session::{Happening, Session};
@@ -202,7 +202,7 @@ fn known(host: &SharedHost, component: &str, what: &str, given: &[(String, Value
             };
         }
         let known = types.iter().map(|(name, _)| name.as_str());
-        let help = did_you_mean(component, "components", known);
+        let help = did_you_mean_path(component, "components", known);
         return Err(error(format!("no configuration creates a component `{component}`: {help}")));
     }
     if host.faults.imitated() {

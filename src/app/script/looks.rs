@@ -2,7 +2,7 @@
 
 use super::options::OptionFields;
 use super::{SharedHost, error, session, values};
-use crate::model::finding::did_you_mean;
+use crate::model::finding::{did_you_mean, did_you_mean_path};
 use crate::model::{ComponentName, ComponentSnapshot, Direction, Ident, MemberRef, RunState, Snapshot};
 use mlua::{Lua, Table, Value as LuaValue};
 use serde_json::{Value as Json, json};
@@ -33,20 +33,25 @@ fn member(text: &str) -> mlua::Result<MemberRef> {
     MemberRef::new(text).map_err(|e| error(e.to_string()))
 }
 
-/// A component that is there, as the snapshot of the system shows it.
-fn component(system: &Snapshot, name: ComponentName) -> mlua::Result<&ComponentSnapshot> {
-    system.components.get(&name).ok_or_else(|| no_component(name.as_str(), system))
+/// The component of a member, as the snapshot of the system shows it.
+fn component<'a>(host: &SharedHost, system: &'a Snapshot, of: MemberRef) -> mlua::Result<&'a ComponentSnapshot> {
+    let name = of.component;
+    let exported = || session(host).ok()?.deployment().exported(name.as_str(), of.member.as_str());
+    system.components.get(&name).ok_or_else(|| match exported() {
+        Some(own) => error(format!("there is no component `{name}`: `{of}` is `{own}` here")),
+        None => no_component(name.as_str(), system),
+    })
 }
 
 fn no_component(name: &str, system: &Snapshot) -> mlua::Error {
-    let help = did_you_mean(name, "components", system.components.keys().map(ComponentName::as_str));
+    let help = did_you_mean_path(name, "components", system.components.keys().map(ComponentName::as_str));
     error(format!("there is no component `{name}`: {help}"))
 }
 
 pub(super) fn property(host: &SharedHost, lua: &Lua, text: &str) -> mlua::Result<LuaValue> {
     let name = member(text)?;
     let system = system(host)?;
-    let component = component(&system, name.component)?;
+    let component = component(host, &system, name)?;
     match component.properties.get(&name.member) {
         Some(value) => values::to_lua(lua, value),
         None => {
@@ -68,7 +73,7 @@ pub(super) fn port(host: &SharedHost, lua: &Lua, text: &str) -> mlua::Result<Lua
     if let Some(value) = system.ports.get(&name) {
         return values::to_lua(lua, value);
     }
-    let ty = component(&system, name.component)?.ty;
+    let ty = component(host, &system, name)?.ty;
     let ins = host.borrow().faults.ports(ty, Direction::In);
     if ins.contains(&name.member) {
         return Ok(LuaValue::Nil);

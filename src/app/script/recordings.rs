@@ -113,6 +113,23 @@ fn written(host: &SharedHost, table: &Table) -> mlua::Result<(BTreeMap<String, u
 }
 
 impl ScriptSample {
+    /// The recording that something is asked of, as `call` has it.
+    fn asked(of: &LuaValue, call: &str) -> mlua::Result<Self> {
+        let sample = of.as_userdata().and_then(|of| of.borrow::<Self>().ok());
+        sample.map(|sample| sample.clone()).ok_or_else(|| {
+            error(format!("what is asked of a recording is asked with a colon: `s:{call}`, where `s = sample{{ … }}`"))
+        })
+    }
+
+    /// The same of one of its signals.
+    fn asked_of(of: &LuaValue, signal: &LuaValue, name: &str) -> mlua::Result<(Self, String)> {
+        let sample = Self::asked(of, &format!("{name}(\"SIGNAL\")"))?;
+        match signal {
+            LuaValue::String(signal) => Ok((sample, signal.to_string_lossy())),
+            _ => Err(error(format!("`{name}` of a recording is asked of one of its signals: `s:{name}(\"SIGNAL\")`"))),
+        }
+    }
+
     /// What to say of it when it could not keep everything.
     pub fn note(&self) -> Option<String> {
         let table = self.recording.table();
@@ -162,20 +179,32 @@ impl ScriptSample {
 
 impl UserData for ScriptSample {
     fn add_methods<M: UserDataMethods<Self>>(methods: &mut M) {
-        methods.add_method("stop", |_, sample, ()| {
-            sample.recording.stop();
+        type Of = (LuaValue, LuaValue);
+        methods.add_function("stop", |_, of: LuaValue| {
+            Self::asked(&of, "stop()")?.recording.stop();
             Ok(())
         });
-        methods.add_method("rms", |_, sample, signal: String| Ok(sample.figures(&signal)?.rms()));
-        methods.add_method("mean", |_, sample, signal: String| Ok(sample.figures(&signal)?.mean()));
-        methods.add_method("max", |_, sample, signal: String| Ok(sample.figures(&signal)?.max));
-        methods.add_method("min", |_, sample, signal: String| Ok(sample.figures(&signal)?.min));
-        methods.add_method("last", |_, sample, signal: String| Ok(sample.figures(&signal)?.last));
-        methods.add_method("count", |_, sample, signal: String| {
+        let figure = |methods: &mut M, name: &'static str, of: fn(&SeriesFigures) -> f64| {
+            methods.add_function(name, move |_, (sample, signal): Of| {
+                let (sample, signal) = Self::asked_of(&sample, &signal, name)?;
+                Ok(of(&sample.figures(&signal)?))
+            });
+        };
+        figure(methods, "rms", SeriesFigures::rms);
+        figure(methods, "mean", SeriesFigures::mean);
+        figure(methods, "max", |of| of.max);
+        figure(methods, "min", |of| of.min);
+        figure(methods, "last", |of| of.last);
+        methods.add_function("count", |_, (sample, signal): Of| {
+            let (sample, signal) = Self::asked_of(&sample, &signal, "count")?;
             Ok(sample.recording.figures(sample.place(&signal)?).count)
         });
-        methods.add_method("values", |lua, sample, signal: String| sample.values(lua, &signal));
-        methods.add_method("times", |lua, sample, ()| {
+        methods.add_function("values", |lua, (sample, signal): Of| {
+            let (sample, signal) = Self::asked_of(&sample, &signal, "values")?;
+            sample.values(lua, &signal)
+        });
+        methods.add_function("times", |lua, of: LuaValue| {
+            let sample = Self::asked(&of, "times()")?;
             lua.create_sequence_from(sample.recording.table().times.into_iter().map(|at| at.as_secs_f64()))
         });
         methods.add_meta_method("__index", |_, _, name: String| -> mlua::Result<LuaValue> {

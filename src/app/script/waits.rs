@@ -1,9 +1,10 @@
 //! What a script waits for: states, answers, events.
 
 use super::{SharedHost, clock, deadline, error, interrupt, session};
-use crate::model::RequestId;
-use crate::model::finding::{did_you_mean, nearest};
+use crate::model::finding::{did_you_mean, meant};
+use crate::model::{EventName, RequestId};
 use crate::session::{Hub, Session};
+use std::collections::BTreeSet;
 
 /// Waits until `look` finds something; tells what was there instead when the time is over.
 fn wait_until<T>(
@@ -90,13 +91,15 @@ pub(super) fn wait_answer(host: &SharedHost, event: &str, seconds: f64) -> mlua:
     Ok(())
 }
 
-/// Which event that coordinators know may be meant by one that none of them knows: a component may raise it all the same.
+/// Which event that is heard or emitted may be meant by one that is neither: a component may raise it all the same.
 fn meant_event(session: &Session, event: &str) -> String {
-    let known = session.events();
+    let deployment = session.deployment();
+    let known: BTreeSet<EventName> =
+        session.events().into_iter().chain(deployment.emits.iter().map(|(event, _)| *event)).collect();
     // What is answered so, and only did not come, is meant.
-    if known.iter().any(|known| known.as_str() == event) || session.deployment().looks_like_answer(event) {
+    if known.iter().any(|known| known.as_str() == event) || deployment.looks_like_answer(event) {
         return String::new();
     }
-    let near = nearest(event, known.iter().map(|known| known.as_str()));
-    near.map_or_else(String::new, |near| format!(" (did you mean `{near}`?)"))
+    let meant = meant(event, known.iter().map(|known| known.as_str()));
+    if meant.is_empty() { String::new() } else { format!(" (did you mean `{}`?)", meant.join("` or `")) }
 }

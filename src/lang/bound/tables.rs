@@ -78,6 +78,7 @@ pub static PROPERTY: BoundTable<PropertyType> = bound!(PROPERTY, PropertyType:
     min,
     max,
     tunable,
+    raises,
     unit,
     doc,
 );

@@ -94,7 +94,7 @@ pub static MONITOR: Object = Object {
 /// What a comparison may have behind its two sides.
 pub static COMPARISON: Object = Object {
     name: "comparison",
-    what: "the options of a comparison",
+    what: "a comparison",
     doc: "What stands behind the two sides of `below`, `at_most`, `above` and `at_least`.",
     example: "above(\"A.x\", 8.0, { hysteresis = 0.5 })",
     keys: &[key(

@@ -179,6 +179,14 @@ pub static PROPERTY: Object = Object {
             ("tunable: running", TEXT_BAD_VALUE),
         )
         .without("`always`"),
+        key(
+            "raises",
+            Form::Truth,
+            "Whether its value, a `string`, is the name of an event that the component raises, empty for none: `davit check` warns of one that nobody listens to.",
+            "raises: true",
+            ("raises: e_seen", TEXT_WRONG_TYPE),
+        )
+        .without("`false`"),
         UNIT,
         doc("doc: gain of the loop"),
     ],

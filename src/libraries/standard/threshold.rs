@@ -52,8 +52,12 @@ impl Component for Threshold {
             events: b.doc("The events.").event_output("events"),
             rise: b.doc("Above this the signal is above.").property("rise", 1.0),
             fall: b.doc("Below this it is below again; above `rise` it counts as `rise`.").property("fall", 0.0),
-            rise_event: Event::new(b.doc("Raised on rising; empty: none.").property("rise_event", String::new())),
-            fall_event: Event::new(b.doc("Raised on falling; empty: none.").property("fall_event", String::new())),
+            rise_event: Event::new(
+                b.doc("Raised on rising; empty: none.").raises().property("rise_event", String::new()),
+            ),
+            fall_event: Event::new(
+                b.doc("Raised on falling; empty: none.").raises().property("fall_event", String::new()),
+            ),
             is_above: false,
         }
     }
