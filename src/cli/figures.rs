@@ -5,6 +5,7 @@ use super::output::{Output, Style, Table};
 use super::{CommandFailure, CommandResult};
 use crate::app::script::{Figure, ScriptSample, ScriptScene};
 use crate::cli::exit::Exit;
+use crate::model::SampleText;
 use crate::model::codes::CLI_UNWRITABLE;
 use crate::monitor::table::decimal;
 use serde_json::{Value as Json, json};
@@ -90,7 +91,7 @@ fn csv(sample: &ScriptSample) -> String {
         text.push_str(&decimal(*at));
         // No number, no sample.
         for value in row {
-            let _ = if value.is_nan() { write!(text, ",") } else { write!(text, ",{value}") };
+            let _ = if value.is_nan() { write!(text, ",") } else { write!(text, ",{}", SampleText(*value)) };
         }
         text.push('\n');
     }

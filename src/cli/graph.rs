@@ -83,7 +83,7 @@ enum Format {
     Plantuml,
     /// SCXML, for other statechart programs (coordinators only).
     Scxml,
-    /// The graph as rFSM's `rfsm2json` writes it (coordinators only).
+    /// The graph in the form of rFSM's `rfsm2json`, each transition under the state that it leads from (coordinators only).
     Json,
 }
 

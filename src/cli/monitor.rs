@@ -13,7 +13,7 @@ use crate::model::codes::{
     SAMPLES_UNREADABLE, SAMPLES_UNUSED,
 };
 use crate::model::finding::{and_also, did_you_mean, has_errors, nearest};
-use crate::model::{Finding, Findings, Monitor, Origin};
+use crate::model::{Finding, Findings, Monitor, Origin, SampleText};
 use crate::monitor::replay::{MonitorEvent, Replay, Tally};
 use crate::monitor::table::{Columns, TableProblem, decimal, empty, is_blank};
 use crate::time::Time;
@@ -249,6 +249,9 @@ impl Args {
 fn number(v: f64) -> String {
     if v.is_infinite() {
         return if v > 0.0 { "∞".to_owned() } else { "-∞".to_owned() };
+    }
+    if v.abs() >= 1e16 {
+        return SampleText(v).to_string();
     }
     let text = format!("{v:.6}");
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }

@@ -12,8 +12,8 @@ use crate::app::script::{beside, digits};
 use crate::diagnostics::SourceMap;
 use crate::lang::Sources;
 use crate::limits;
-use crate::model::Code;
 use crate::model::codes::{SCRIPT_UNKNOWN_PARAMETER, TEXT_UNKNOWN_PARAMETER};
+use crate::model::{Code, SampleText};
 use grid::{GridAxis, axes, points};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use runs::{PointEnd, PointRun, Sweeping};
@@ -218,7 +218,9 @@ fn csv(axes: &[GridAxis], points: &[Vec<&str>], runs: &[PointRun], columns: &[(S
     let mut text = line(names.map(|name| quoted(name)).chain(["end".to_owned()]).collect());
     for (point, run) in points.iter().zip(runs) {
         let values = columns.iter().map(|(name, _)| {
-            figure(run, name).and_then(|figure| figure["value"].as_f64()).map_or_else(String::new, |v| v.to_string())
+            figure(run, name)
+                .and_then(|figure| figure["value"].as_f64())
+                .map_or_else(String::new, |v| SampleText(v).to_string())
         });
         let end = [run.end.word().to_owned()];
         text += &line(point.iter().map(|value| quoted(value)).chain(values).chain(end).collect());

@@ -23,7 +23,7 @@ impl Engine {
     pub(super) fn survive(&mut self, text: &str) {
         self.panics += 1;
         // What has come of what was under way is not known so well.
-        self.emergency = None;
+        self.emergencies.clear();
         let _ = catch_unwind(AssertUnwindSafe(|| {
             self.given.tells(|| Progress::Survived(text.to_owned()));
         }));

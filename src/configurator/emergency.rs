@@ -5,66 +5,88 @@ use super::progress::Progress;
 use super::repair::By;
 use super::request::Reason;
 use super::running::Running;
-use crate::model::ComponentName;
-use crate::stack::{BeforeEmergency, Broken, Residual, World};
+use crate::model::{ComponentName, ConfigId};
+use crate::stack::{BeforeEmergency, Broken, Requester, Residual, World, concerns};
 use crate::system::{System, touch};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
 impl Engine {
-    /// A safe configuration begins: `without` is the picture without what it interrupts, where that had done anything.
-    pub(super) fn emergency_begins(&mut self, without: Option<&System>) {
-        let World { stack, broken, system, .. } = &self.world;
+    /// A safe configuration begins: `without` is the picture without what it interrupts, where that had done anything. Each (sub)system has an
+    /// emergency of its own, but where one of what it is in goes on.
+    pub(super) fn emergency_begins(&mut self, id: ConfigId, without: Option<&System>) {
+        let path = id.prefix();
+        let covered = self.emergencies.iter().any(|emergency| emergency.covers(path));
+        let World { stack, system, .. } = &self.world;
+        let before = BeforeEmergency::new(path, stack, without.unwrap_or(system).clone());
         // Of what goes on beside it nobody knows yet what it will have been.
-        let rests = self.running.iter().all(Running::is_interrupted) && stack.safe().next().is_none();
-        if self.emergency.is_some() || !rests || !broken.is_empty() || self.is_in_part() {
+        let is_safe = stack.frames().iter().any(|frame| frame.safe && concerns(frame, path));
+        if covered || is_safe || !self.is_settled(&before, true) {
             return;
         }
-        self.emergency = Some(BeforeEmergency::new(stack, without.unwrap_or(system).clone()));
+        self.emergencies.push(before);
     }
 
     /// A component has failed.
     pub(super) fn fails_in_emergency(&mut self, component: ComponentName) {
-        if let Some(emergency) = &mut self.emergency {
-            emergency.has_failed(component);
-        }
+        self.emergencies.iter_mut().for_each(|emergency| emergency.has_failed(component));
     }
 
-    /// Somebody takes what is there for what is to be there, or part of it.
+    /// Somebody takes what is there for what is to be there.
     pub(super) fn is_accepted(&mut self) {
-        self.emergency = None;
+        self.emergencies.clear();
     }
 
-    /// Whether some frame is in force in part.
-    fn is_in_part(&self) -> bool {
-        self.world.stack.frames().iter().any(|frame| self.world.stack.is_in_part(frame))
+    /// Somebody is about to make what is theirs permanent.
+    pub(super) fn is_made_permanent(&mut self, by: Requester) {
+        let stack = &self.world.stack;
+        self.emergencies.iter_mut().for_each(|emergency| emergency.is_permanent(stack, by));
+    }
+
+    /// Whether nothing of what an emergency is about is under way (but for what it has interrupted, when it `begins`), nor broken, nor in force in
+    /// part.
+    fn is_settled(&self, of: &BeforeEmergency, begins: bool) -> bool {
+        let World { stack, broken, quarantined, .. } = &self.world;
+        let works = |running: &Running| {
+            let is_about = || running.machine.components().into_iter().any(|component| of.is_about(component));
+            !(begins && running.is_interrupted()) && is_about()
+        };
+        !self.running.iter().any(works)
+            && !broken.iter().flat_map(|broken| &broken.components).any(|component| of.is_about(*component))
+            && (begins || !quarantined.iter().any(|component| of.is_about(*component)))
+            && !stack.frames().iter().any(|frame| of.concerns(frame) && stack.is_in_part(frame))
     }
 
     /// Where nothing of an emergency is under way, and nothing of what came of it is broken or in force in part: the safe configuration that
     /// is left of it is seen to lead back. When none is left what differs from before is told, and put right where nothing moves by
     /// that. Else it is for who recovers.
-    pub(super) fn look_at_emergency(&mut self) {
-        let World { stack, broken, quarantined, system, .. } = &self.world;
-        let Some(emergency) = &mut self.emergency else { return };
-        if !self.running.is_empty() || !self.safety.waiting.is_empty() || !broken.is_empty() || !quarantined.is_empty()
-        {
+    pub(super) fn look_at_emergencies(&mut self) {
+        if !self.safety.waiting.is_empty() {
             return;
         }
-        if stack.safe().next().is_some() {
-            if let Some(frame) = emergency.leading_back(system, stack, &self.given.context) {
-                self.world.stack.replace(frame);
-                self.changed();
+        let mut at = 0;
+        while at < self.emergencies.len() {
+            let emergency = &self.emergencies[at];
+            if !self.is_settled(emergency, false) {
+                at += 1;
+            } else if self.world.stack.frames().iter().any(|frame| frame.safe && emergency.concerns(frame)) {
+                let World { stack, system, .. } = &mut self.world;
+                if let Some(frame) = self.emergencies[at].leading_back(system, stack, &self.given.context) {
+                    stack.replace(frame);
+                    self.changed();
+                }
+                at += 1;
+            } else {
+                let emergency = self.emergencies.remove(at);
+                self.is_over(emergency);
             }
-            return;
         }
-        if self.is_in_part() {
-            return;
-        }
-        let Some(emergency) = self.emergency.take() else { return };
-        let Some((wanted, difference)) = emergency.left(&self.world.system, &self.world.stack) else { return };
-        if difference.is_empty() {
-            return;
-        }
+    }
+
+    /// Nothing of it is in force any more.
+    fn is_over(&mut self, mut emergency: BeforeEmergency) {
+        let left = emergency.left(&self.world.system, &self.world.stack, &self.given.context);
+        let Some((wanted, difference)) = left.filter(|(_, difference)| !difference.is_empty()) else { return };
         let components: BTreeSet<ComponentName> = difference.iter().flat_map(touch::components).collect();
         let expected = wanted.snapshot_some(&components.iter().copied().collect::<Vec<_>>());
         let cause = Reason::LeftByEmergency(difference.clone());

@@ -83,8 +83,8 @@ pub(super) struct Engine {
     /// Plans that are carried out again, at most so many of each configuration, the one used last at the end.
     pub switches: FxHashMap<ConfigId, Vec<Fast>>,
     pub confirmations: Confirmations,
-    /// The emergency that is not over.
-    pub emergency: Option<BeforeEmergency>,
+    /// Emergencies that are not over.
+    pub emergencies: Vec<BeforeEmergency>,
     /// Coordinators that are down.
     pub down: BTreeSet<Requester>,
     /// Requests that have begun and were not answered.
@@ -133,7 +133,7 @@ impl Engine {
             told_broken: false,
             switches: FxHashMap::default(),
             confirmations: Confirmations::default(),
-            emergency: None,
+            emergencies: Vec::new(),
             down: BTreeSet::new(),
             current: SmallVec::new(),
             revision: 0,
@@ -177,13 +177,13 @@ impl Engine {
             {
                 did = true;
                 self.begin(number);
-                self.look_at_emergency();
+                self.look_at_emergencies();
                 if self.urgent() {
                     break;
                 }
             }
             did |= self.advance_all();
-            self.look_at_emergency();
+            self.look_at_emergencies();
             self.review_standings();
             self.tell_fallen();
             self.look_at_suspects();

@@ -11,7 +11,7 @@ use crate::limits;
 use crate::model::{ComponentName, RunState, Snapshot, Step};
 use crate::plan::footprint::Footprint;
 use crate::stack::{Broken, Frame};
-use crate::system::touch::{self, Access, Slot, touches};
+use crate::system::touch::{self, Access, touches};
 use crate::system::{self, View as _};
 use rustc_hash::FxHashSet;
 use std::sync::Arc;
@@ -196,19 +196,10 @@ impl Engine {
         let writes = |footprint: &Footprint| {
             let mut own = footprint.touches.iter().filter(|touch| touch.access != Access::Need);
             own.any(|own| {
-                slots.iter().filter(|touch| touch.access != Access::Need).any(|touch| same(own.slot, touch.slot))
+                slots.iter().filter(|touch| touch.access != Access::Need).any(|touch| own.slot.overlaps(touch.slot))
             })
         };
         let mut frames = self.world.stack.frames().iter().rev();
         frames.find(|frame| of(frame) && writes(&frame.footprint)).cloned()
     }
-}
-
-/// Whether a write of one is a write of the other: the existence of a component is all of it.
-fn same(a: Slot, b: Slot) -> bool {
-    let about = |whole: Slot, other: Slot| match whole {
-        Slot::Component(name) => other.components().0 == name || other.components().1 == name,
-        _ => false,
-    };
-    a == b || about(a, b) || about(b, a)
 }

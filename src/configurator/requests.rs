@@ -125,8 +125,8 @@ impl Engine {
                 continue;
             }
             if group.commits {
+                self.is_made_permanent(requests[0].requester);
                 self.world.stack.make_permanent(requests[0].requester);
-                self.is_accepted();
                 self.forget_confirmations();
                 self.changed();
             }

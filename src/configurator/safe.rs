@@ -45,7 +45,7 @@ impl Engine {
         let configurations = self.given.configurations.clone();
         let Some(configuration) = configurations.get(&id) else { return };
         let before = self.interrupt(id);
-        self.emergency_begins(before.as_ref());
+        self.emergency_begins(id, before.as_ref());
         let at = self.given.clock.now();
         // What earlier safe ones will have done counts as done; but what both write only this one does.
         let was = self.earlier_safe(&request);

@@ -38,6 +38,7 @@ impl Engine {
             }
             QueuedCommand::DiscardStack => {
                 self.world.stack.discard();
+                self.is_accepted();
                 self.confirmations.clear();
                 self.changed();
             }
@@ -91,6 +92,7 @@ impl Engine {
         let deadline = deadline.max(self.given.clock.now() + self.given.limits.step_timeout);
         self.remove_all(&mut down, deadline);
         self.world.stack.discard();
+        self.is_accepted();
         self.world.broken.clear();
         if !down.is_clean() {
             let expected = System::new(self.world.system.catalogue().clone());

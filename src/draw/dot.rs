@@ -1,6 +1,6 @@
 //! A diagram in Graphviz' language; groups become clusters, ports record fields.
 
-use super::diagram::{Diagram, DiagramNode, RankDirection, Shape, Tone};
+use super::diagram::{Diagram, DiagramEdge, DiagramNode, RankDirection, Shape, Tone};
 use std::fmt::Write as _;
 
 pub(super) fn write(diagram: &Diagram) -> String {
@@ -18,7 +18,7 @@ pub(super) fn write(diagram: &Diagram) -> String {
     out.push_str("  node [fontname=\"Helvetica\", fontsize=11, style=\"rounded,filled\", fillcolor=white];\n");
     out.push_str("  edge [fontname=\"Helvetica\", fontsize=10];\n");
     level(&mut out, diagram, None, 1);
-    for edge in &diagram.edges {
+    for (at, edge) in diagram.edges.iter().enumerate() {
         let mut attributes = Vec::new();
         if !edge.label.is_empty() {
             attributes.push(format!("label={}", quoted(&edge.label.join("\n"))));
@@ -28,18 +28,35 @@ pub(super) fn write(diagram: &Diagram) -> String {
         }
         let (from, tail) = anchor(diagram, edge.from);
         let (to, head) = anchor(diagram, edge.to);
-        if let Some(cluster) = tail {
-            attributes.push(format!("ltail=\"cluster_{cluster}\""));
+        let tail = tail.map(|cluster| format!("ltail=\"cluster_{cluster}\""));
+        let head = head.map(|cluster| format!("lhead=\"cluster_{cluster}\""));
+        if bends(diagram, edge).is_some() {
+            let out_of: Vec<String> =
+                attributes.iter().cloned().chain(tail).chain(["arrowhead=none".to_owned()]).collect();
+            let into: Vec<String> = edge.dashed.then(|| "style=dashed".to_owned()).into_iter().chain(head).collect();
+            let _ = writeln!(out, "  n{from} -> b{at} [{}];", out_of.join(", "));
+            let _ = writeln!(out, "  b{at} -> n{to} [{}];", into.join(", "));
+            continue;
         }
-        if let Some(cluster) = head {
-            attributes.push(format!("lhead=\"cluster_{cluster}\""));
-        }
+        attributes.extend(tail.into_iter().chain(head));
         let from_port = edge.from_port.map_or_else(String::new, |p| format!(":o{p}:e"));
         let to_port = edge.to_port.map_or_else(String::new, |p| format!(":i{p}:w"));
         let _ = writeln!(out, "  n{from}{from_port} -> n{to}{to_port} [{}];", attributes.join(", "));
     }
     out.push_str("}\n");
     out
+}
+
+/// The cluster that an edge leads from, or to, and whose other end is inside of it: Graphviz draws no such edge, so it goes by a point beside that
+/// cluster.
+fn bends(diagram: &Diagram, edge: &DiagramEdge) -> Option<usize> {
+    let is_inside = |node: usize, cluster: usize| {
+        std::iter::successors(Some(node), |at| diagram.nodes[*at].parent).any(|at| at == cluster)
+    };
+    let is_cluster = |node: usize| anchor(diagram, node).1.is_some();
+    let (from, to) = (edge.from, edge.to);
+    let out_of = Some(from).filter(|from| is_cluster(*from) && is_inside(to, *from));
+    out_of.or(Some(to).filter(|to| is_cluster(*to) && is_inside(from, *to)))
 }
 
 /// The node an edge of `index` is tied to: itself, or for a cluster something in it and the cluster.
@@ -67,6 +84,9 @@ fn level(out: &mut String, diagram: &Diagram, group: Option<usize>, depth: usize
             );
             level(out, diagram, Some(index), depth + 1);
             let _ = writeln!(out, "{indent}}}");
+            for (at, _) in diagram.edges.iter().enumerate().filter(|(_, edge)| bends(diagram, edge) == Some(index)) {
+                let _ = writeln!(out, "{indent}b{at} [shape=point, width=0.02];");
+            }
             continue;
         }
         let look = match node.shape {
@@ -84,12 +104,14 @@ fn level(out: &mut String, diagram: &Diagram, group: Option<usize>, depth: usize
                         .collect::<Vec<_>>()
                         .join("|")
                 };
-                let label = format!(
-                    "{}|{{{{{}}}|{{{}}}}}",
-                    field(&heading(node)),
-                    ports("i", &node.ins),
-                    ports("o", &node.outs)
-                );
+                // In-ports stand on the side that arrows come from.
+                let sides = [("i", &node.ins), ("o", &node.outs)].map(|(side, names)| match names.is_empty() {
+                    true => String::new(),
+                    false => format!("{{{}}}", ports(side, names)),
+                });
+                let [ins, outs] = sides;
+                let all = [ins, field(&heading(node)), outs];
+                let label = all.into_iter().filter(|field| !field.is_empty()).collect::<Vec<_>>().join("|");
                 format!("shape=record, label=\"{{{label}}}\", fillcolor=\"{}\"", fill(node.tone, 0))
             }
         };

@@ -92,11 +92,16 @@ fn state_level(out: &mut String, diagram: &Diagram, group: Option<usize>, depth:
                 let _ = writeln!(out, "{indent}state n{index} <<choice>>");
             }
             Shape::Box | Shape::Group => {
-                let _ = writeln!(out, "{indent}state \"{}\" as n{index}", plain(&node.title));
-                if diagram.children(Some(index)).next().is_some() {
+                // Of a state with states in it Mermaid takes one label and no description.
+                let is_group = diagram.children(Some(index)).next().is_some();
+                let lines = if is_group { &node.lines[..] } else { &[] };
+                let label: Vec<&str> = std::iter::once(&node.title).chain(lines).map(String::as_str).collect();
+                let _ = writeln!(out, "{indent}state \"{}\" as n{index}", plain(&label.join("\n")));
+                if is_group {
                     let _ = writeln!(out, "{indent}state n{index} {{");
                     state_level(out, diagram, Some(index), depth + 1);
                     let _ = writeln!(out, "{indent}}}");
+                    continue;
                 }
                 for line in &node.lines {
                     let _ = writeln!(out, "{indent}n{index} : {}", plain(line));

@@ -57,4 +57,4 @@ pub use state_list::{DefaultTwice, StateEntry, StateList, Target};
 pub use statechart::Statechart;
 pub use step::Step;
 pub use subsystem::{Export, Interface, LeavingRule, SubsystemStanding};
-pub use value::{Value, ValueType};
+pub use value::{SampleText, Value, ValueType};

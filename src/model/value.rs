@@ -274,6 +274,20 @@ impl fmt::Display for Value {
     }
 }
 
+/// A number as tables of samples have it: with an exponent where it would be written with many zeros, so that who reads them takes it for a number.
+#[derive(Debug, Clone, Copy)]
+pub struct SampleText(pub f64);
+
+impl fmt::Display for SampleText {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let size = self.0.abs();
+        match size.is_finite() && (size >= 1e16 || size != 0.0 && size < 1e-5) {
+            true => write!(f, "{:e}", self.0),
+            false => write!(f, "{}", self.0),
+        }
+    }
+}
+
 impl From<bool> for Value {
     fn from(v: bool) -> Self {
         Self::Bool(v)
@@ -405,6 +419,17 @@ mod tests {
 
     fn ty(text: &str) -> ValueType {
         text.parse().unwrap()
+    }
+
+    #[test]
+    fn tables_write_numbers_that_are_read_as_numbers() {
+        let text = |value| SampleText(value).to_string();
+        assert_eq!([text(0.0), text(0.5), text(-120.0), text(1e15)], ["0", "0.5", "-120", "1000000000000000"]);
+        assert_eq!([text(1e20), text(-1e300), text(2.5e-9)], ["1e20", "-1e300", "2.5e-9"]);
+        assert_eq!(text(f64::INFINITY), "inf");
+        for value in [1e20, 3.0e-7, 0.1, 123.456] {
+            assert_eq!(text(value).parse(), Ok(value));
+        }
     }
 
     #[test]

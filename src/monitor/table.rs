@@ -192,8 +192,8 @@ pub fn empty(header: bool) -> TableProblem {
 /// The value of a cell.
 fn value(text: &str) -> Option<f64> {
     match text {
-        "true" => Some(1.0),
-        "false" => Some(0.0),
+        "true" | "True" => Some(1.0),
+        "false" | "False" => Some(0.0),
         _ => text.parse().ok().or_else(|| RunState::from_name(text).map(state_value)),
     }
 }

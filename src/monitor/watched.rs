@@ -177,8 +177,8 @@ impl WatchedMonitor {
             true => _ = self.program.evaluate(target, &self.held),
             false => self.program.go_on(target),
         }
-        if self.verdict == Some(true) && !self.program.grade().holds {
-            // What was due before it ended was due.
+        if self.sampling == Sampling::OnSample && self.verdict == Some(true) && !self.program.grade().holds {
+            // What was due before it ended was due; who looks at ticks only sees at this one that it has ended.
             self.repeat(Time(now.as_nanos().saturating_sub(1)), raise);
         }
         self.observe(now, raise);

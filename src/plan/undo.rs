@@ -84,7 +84,8 @@ pub struct Script<'o, 's> {
     goals: BTreeMap<ComponentName, (Wanted, PlanStage, Origin)>,
     /// Components that were met failed. The order is then that of the list.
     failed: BTreeSet<ComponentName>,
-    /// What concerns a component that is not there is left out: nothing of it is to be taken back.
+    /// What concerns a component that is not there is left out: nothing of it is to be taken back. So is what is made, connected or disconnected
+    /// already: what something safe had done may have gone with a component that was taken away under it.
     pub leaves_out_gone: bool,
 }
 
@@ -113,9 +114,11 @@ impl<'o, 's> Script<'o, 's> {
     /// The false preconditions.
     pub fn add(&mut self, item: DraftStep, wave: u32, after: &[StepId]) -> Result<Option<StepId>, Vec<Violation>> {
         let component = item.step.component();
-        if self.leaves_out_gone && !matches!(item.step, Step::Create { .. }) {
+        if self.leaves_out_gone {
             let gone = |name: &ComponentName| self.view.component(*name).is_none();
-            if components(&item.step).iter().any(gone) {
+            let is_gone = !matches!(item.step, Step::Create { .. }) && components(&item.step).iter().any(gone);
+            let is_made = matches!(item.step, Step::Create { .. } | Step::Connect { .. } | Step::Disconnect { .. });
+            if is_gone || is_made && is_so(&item.step, self.view) {
                 return Ok(None);
             }
         }

@@ -10,11 +10,11 @@ use super::there::{is_done, of_what_is_there};
 use super::void::rest;
 use super::work::{Op, Part, Planned, transaction};
 use super::{Edits, Frame, FrameId, Inverse, Reason, Request, Stack};
-use crate::model::{Change, ComponentName, Configuration, RunState, StateList, Step, Transition, codes};
+use crate::model::{Change, ChangeKind, ComponentName, Configuration, RunState, StateList, Step, Transition, codes};
 use crate::plan::footprint::{Footprint, Slot};
 use crate::plan::undo::{DraftStep, absolute, items};
 use crate::plan::{PlanContext, PlannedStep, plan_on};
-use crate::system::touch::slot;
+use crate::system::touch::{Access, Touch, slot};
 use crate::system::{Overlay, System, View};
 use crate::time::Time;
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -41,9 +41,33 @@ pub fn effort(
     at: Time,
     context: &PlanContext,
 ) -> BestEffort {
-    on_top(system, stack, configuration, request, (at, context))
+    let mut best = on_top(system, stack, configuration, request, (at, context))
         .or_else(|| whole(system, stack, configuration, request, (at, context)))
-        .unwrap_or_else(|| piecewise(system, configuration, request, at, context))
+        .unwrap_or_else(|| piecewise(system, configuration, request, at, context));
+    let own = |frame: &Arc<Frame>| frame.configuration == configuration.id;
+    if configuration.group.is_none() && stack.frames.iter().any(own) {
+        best.keeps_gone(system, configuration);
+    }
+    best
+}
+
+impl BestEffort {
+    /// What it would destroy and is gone already, by its own frame below, is to stay so: the undo of that one may not make it anew.
+    fn keeps_gone(&mut self, system: &System, configuration: &Configuration) {
+        let gone = |change: &Change| match change.kind {
+            ChangeKind::Destroy { component } if system.component(component).is_none() => Some(component),
+            _ => None,
+        };
+        let gone: Vec<ComponentName> = configuration.changes.iter().filter_map(gone).collect();
+        if gone.is_empty() {
+            return;
+        }
+        let needs = gone.into_iter().map(|component| Touch::new(Slot::Component(component), Access::Need));
+        Arc::make_mut(&mut self.frame.footprint).touches.extend(needs);
+        let frame = Some(Arc::new(self.frame.clone()));
+        let part = &mut self.planned.parts[0];
+        (part.frame, part.edits.push) = (frame.clone(), frame);
+    }
 }
 
 /// Planned whole, if it can be.

@@ -50,6 +50,15 @@ impl Slot {
         }
     }
 
+    /// Whether a write of one is a write of the other: the existence of a component is all of it.
+    pub fn overlaps(self, other: Self) -> bool {
+        let about = |whole: Self, of: Self| match whole {
+            Self::Component(name) => of.components().0 == name || of.components().1 == name,
+            _ => false,
+        };
+        self == other || about(self, other) || about(other, self)
+    }
+
     /// Whether writes to it are absolute: they say what it holds afterwards whatever it held before.
     pub fn is_absolute(self) -> bool {
         matches!(self, Self::Property(_) | Self::Port(_))

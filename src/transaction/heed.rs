@@ -73,6 +73,8 @@ impl Transaction {
 pub(super) struct Heed<'t> {
     touched: &'t Touched,
     doomed: FxHashSet<ComponentName>,
+    /// All that were, also those that it could not take away.
+    made: FxHashSet<ComponentName>,
     remade: FxHashSet<ComponentName>,
     /// What it has made and safe configurations have made as well: that stays, and nothing else of it.
     shared: FxHashSet<ComponentName>,
@@ -103,8 +105,9 @@ impl<'t> Heed<'t> {
             _ => None,
         });
         let created = if touched.is_empty() { Vec::new() } else { created.collect() };
-        let (shared, doomed) = created.into_iter().partition(|of| touched.wants_there(*of) == Some(true));
-        Self { touched, doomed, remade: FxHashSet::default(), shared }
+        let (shared, doomed): (_, FxHashSet<_>) =
+            created.into_iter().partition(|of| touched.wants_there(*of) == Some(true));
+        Self { touched, made: doomed.clone(), doomed, remade: FxHashSet::default(), shared }
     }
 
     /// A step that came in late goes back by itself, or stays since it was overwritten: what it made is then not there to be
@@ -112,6 +115,7 @@ impl<'t> Heed<'t> {
     pub fn came_late(&mut self, step: &Step) {
         if let Step::Create { component, .. } = step {
             self.doomed.remove(component);
+            self.made.remove(component);
         }
     }
 
@@ -131,8 +135,10 @@ impl<'t> Heed<'t> {
         let missing = |component: &ComponentName| view.component(*component).is_none();
         match back {
             Step::Create { component, ty, activity, properties } => {
-                // What they have destroyed as well their own end makes again.
-                if !missing(component) || self.touched.wants_there(*component) == Some(false) {
+                // What they have destroyed as well their own end makes again. What stands in its place and could not be taken away
+                // supersedes nothing.
+                let superseded = !missing(component) && !self.made.contains(component);
+                if superseded || self.touched.wants_there(*component) == Some(false) {
                     return smallvec![];
                 }
                 self.remade.insert(*component);

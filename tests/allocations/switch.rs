@@ -19,6 +19,7 @@ fn arm() -> System {
         min: Some(0.0),
         max: Some(10.0),
         tunable: Tunable::Stopped,
+        raises: false,
         unit: None,
         doc: String::new(),
         origin: Origin::NONE,

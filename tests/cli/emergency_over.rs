@@ -237,7 +237,23 @@ fn demo(configurations: &[&str; 5]) -> Demo {
 
 #[test]
 fn where_the_same_is_in_force_it_is_as_before() {
-    for Case { what, configurations, comes, told } in CASES {
+    CASES.iter().for_each(|case| ends_as_before(case, ""));
+}
+
+/// What is in force when an emergency comes, and whose place that takes, is gone afterwards, and nothing else is.
+#[test]
+fn where_something_ordinary_of_its_group_was_in_force_it_is_as_without_that() {
+    let alone = CASES.iter().filter(|case| !case.comes.contains("slow') ") && !case.comes.contains("'e_slow'"));
+    let mut some = 0;
+    for case in alone.filter(|case| !case.comes.contains("apply('slow'")) {
+        ends_as_before(case, "raise('e_slow') wait(0.5)");
+        some += 1;
+    }
+    assert!(some >= 5, "{some}");
+}
+
+fn ends_as_before(Case { what, configurations, comes, told }: &Case, first: &str) {
+    {
         let demo = demo(configurations);
         demo.write(
             "s.lua",
@@ -249,7 +265,7 @@ fn where_the_same_is_in_force_it_is_as_before() {
                    return true
                  end
                  deploy('over.yaml') wait(0.2) local before = system() local told = nil
-                 {comes}
+                 {first} {comes}
                  local told_of = 0
                  for _, entry in ipairs(log()) do
                    if entry.note and string.find(entry.note, 'the emergency is over', 1, true) then told_of = told_of + 1 end
@@ -261,7 +277,109 @@ fn where_the_same_is_in_force_it_is_as_before() {
         let ran = demo.run(&["run", "s.lua", "--clock", "simulated", "--quiet"]);
         let said = ran.out.lines().find(|line| line.starts_with("true ") || line.starts_with("false "));
         let expected = format!("true 0 2 {told}");
-        assert_eq!((said, ran.code), (Some(expected.as_str()), 0), "{what}: {}{}", ran.out, ran.err);
+        assert_eq!((said, ran.code), (Some(expected.as_str()), 0), "{what} {first}: {}{}", ran.out, ran.err);
+    }
+}
+
+/// The end of an emergency moves what that had moved itself, and nothing else: what somebody's undo has left so is for who asks for that.
+#[test]
+fn it_sets_nothing_in_motion_that_it_has_not_stopped() {
+    let stop = "changes: [{ port_write: { port: m.speed, value: 0.0 } }]";
+    let runs = "changes: [{ property_set: { property: m.limit, value: 0.8 } }], post_conf_state: [\"m:running\"]";
+    let demo = demo(&["post_conf_state: [\"m:stopped\"]", runs, QUICK, stop, STILL]);
+    demo.write(
+        "s.lua",
+        "deploy('over.yaml') wait(0.2) apply('slow', { force = true }) wait(1)
+         fault('property_set m.limit', 'fail', 3) undo('slow', { force = true }) wait(1)
+         raise('e_stop') wait(1) raise('e_stop') wait(1) raise('e_reset') wait(2)
+         for _, entry in ipairs(log()) do for _, step in ipairs(entry.steps or {}) do
+           if entry.at > 2 and step.step == 'start m' and step.outcome == 'done' then say('started by ' .. entry.answer) end
+         end end
+         say('m ' .. state('m')) shutdown{ force = true }",
+    );
+    let ran = demo.run(&["run", "s.lua", "--clock", "simulated", "--quiet"]);
+    let found: Vec<&str> =
+        ran.out.lines().filter(|line| line.starts_with("m ") || line.starts_with("started")).collect();
+    assert_eq!(found, ["m stopped"], "{}{}", ran.out, ran.err);
+}
+
+/// A hot swap that is interrupted by an emergency which connects what is being swapped: both can be let go of.
+#[test]
+fn what_it_connects_in_the_middle_of_a_hot_swap_is_let_go_of() {
+    let connects = "changes: [{ connect: { from: x.o, to: n.ref, policy: data } }]";
+    let swap = "changes: [{ replace: { component: n, type: Motor } }]";
+    let demo = demo(&["post_conf_state: [\"n:running\"]", swap, QUICK, connects, STILL]);
+    for step in ["stop", "cleanup", "destroy", "create", "configure", "start"] {
+        demo.write(
+            "s.lua",
+            &format!(
+                "deploy('over.yaml') wait(0.2) fault('{step} n', 'slow', 1, 0.3) raise('e_slow') wait(0.1) raise('e_stop') wait(2)
+                 raise('e_reset') wait(1) pcall(undo, 'slow', {{ force = true }}) wait(1)
+                 say('n ' .. state('n') .. ' ' .. #system().connections .. ' ' .. #stack() .. ' ' .. #drift()) shutdown()"
+            ),
+        );
+        let ran = demo.run(&["run", "s.lua", "--clock", "simulated", "--quiet"]);
+        let found = ran.out.lines().find(|line| line.starts_with("n "));
+        assert_eq!((found, ran.code), (Some("n running 1 2 0"), 0), "{step}: {}{}", ran.out, ran.err);
+    }
+}
+
+/// Each subsystem has an emergency of its own: what a sibling is just doing, or has broken, is no matter of it.
+#[test]
+fn what_goes_on_in_a_sibling_is_no_matter_of_it() {
+    let frees = "changes: [{ disconnect: { from: l.o, to: m.ref } }, { port_write: { port: m.ref, value: 0.0 } }]";
+    let demo = demo(&["post_conf_state: [\"m:running\"]", LIMIT, QUICK, frees, STILL]);
+    demo.write(
+        "pair.yaml",
+        "davit: 1
+name: pair
+platform: simulated
+types: {}
+subsystems: { left: { deployment: over.yaml }, right: { deployment: over.yaml } }
+configurations: [nothing.yaml]
+coordinator: both.yaml
+safety: [e_stop, e_halt]
+deploy: { event: e_go, up: on, failed: [failed], within_s: 10 }
+shutdown: { event: e_down, down: idle, within_s: 20 }
+",
+    );
+    demo.write("nothing.yaml", "configurations: {}\n");
+    demo.write(
+        "both.yaml",
+        "coordinator:
+  states: { idle: {}, a: { entry: left/e_start }, b: { entry: right/e_start }, on: {}, failed: {}, c: { entry: left/e_end }, d: { entry: right/e_end } }
+  transitions:
+    - { src: initial, tgt: idle }
+    - { src: idle, tgt: a, events: [e_go] }
+    - { src: a, tgt: b, events: [left/up] }
+    - { src: b, tgt: on, events: [right/up] }
+    - { src: a, tgt: failed, events: [left/failed] }
+    - { src: b, tgt: failed, events: [right/failed] }
+    - { src: [a, b, on, failed], tgt: c, events: [e_down] }
+    - { src: c, tgt: d, events: [left/down, left/e_end.ignored] }
+    - { src: d, tgt: idle, events: [right/down, right/e_end.ignored] }
+"
+        .replace("    - { src: [a, b, on, failed], tgt: c, events: [e_down] }\n", &["a", "b", "on", "failed"].map(|src| {
+            format!("    - {{ src: {src}, tgt: c, events: [e_down] }}\n")
+        }).concat())
+        .as_str(),
+    );
+    for busy in
+        ["", "fault('property_set right/m.limit', 'slow', 1, 0.8)", "fault('property_set right/m.limit', 'late', 1)"]
+    {
+        demo.write(
+            "s.lua",
+            &format!(
+                "deploy('pair.yaml') wait(0.2) {busy} raise('right/e_slow') wait(0.1)
+                 fault('disconnect left/l.o -> left/m.ref', 'slow', 1, 0.3)
+                 raise('e_stop', {{ to = {{ 'left' }} }}) wait(0.1) raise('e_stop', {{ to = {{ 'left' }} }}) wait(1)
+                 raise('left/e_reset') wait_answer('left/stop.undone', 1)
+                 local left = 0 for _, frame in ipairs(stack()) do if frame.configuration == 'left/stop' then left = left + 1 end end
+                 say('left ' .. left) wait(10) recover('back') shutdown()"
+            ),
+        );
+        let ran = demo.run(&["run", "s.lua", "--clock", "simulated", "--quiet"]);
+        assert!(ran.code == 0 && ran.out.contains("left 0"), "{busy}: {}{}", ran.out, ran.err);
     }
 }
 
@@ -278,6 +396,11 @@ fn what_was_accepted_meanwhile_stays() {
         (
             "set('m.limit', 0.9, { force = true, within = 1 }) raise('e_stop') wait(1) commit{ force = true } wait(1)
              raise('e_reset') wait(1)",
+            "m running n running l x, limit 0.9, told 0",
+        ),
+        (
+            "raise('e_halt') wait(1) set('m.limit', 0.9, { force = true, within = 1 }) commit{ force = true } wait(1) fault('stop m', 'slow', 1, 0.3)
+             raise('e_stop') wait(0.1) raise('e_stop') wait(1) raise('e_reset') wait(1)",
             "m running n running l x, limit 0.9, told 0",
         ),
         (

@@ -29,6 +29,7 @@ pub fn catalogue() -> Catalogue {
         min: Some(-100.0),
         max: Some(100.0),
         tunable,
+        raises: false,
         unit: None,
         doc: String::new(),
         origin: Origin::NONE,

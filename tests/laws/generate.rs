@@ -114,6 +114,7 @@ pub fn catalogue(genes: &[TypeGene], irreversible: bool) -> Arc<Catalogue> {
                 min: (limits % 2 == 1).then_some(0.0),
                 max: (limits % 3 == 2).then_some(2.0),
                 tunable: [Tunable::Always, Tunable::Stopped, Tunable::Unconfigured][*tunable as usize % 3],
+                raises: false,
                 unit: None,
                 doc: String::new(),
                 origin: Origin::NONE,

@@ -147,6 +147,20 @@ fn the_event_is_repeated_while_true() {
     assert_eq!(rig.events(), ["100000000 e_on", "147000000 e_on", "150000000 e_on"]);
 }
 
+/// Who looks at ticks sees at the second of two that it has ended: no beat was due between them.
+#[test]
+fn what_has_ended_between_two_ticks_is_not_repeated_at_the_second() {
+    let mut m = monitor(above("A.x", 1.0));
+    m.sampling = Sampling::Every(ms(10));
+    m.repeat = Some(ms(7));
+    let mut rig = Rig::new(&[m]);
+    rig.sample("A.x", 0, 2.0);
+    rig.run(5 * MS);
+    rig.sample("A.x", 5 * MS, 0.0);
+    rig.run(40 * MS);
+    assert_eq!(rig.events(), ["0 e_on", "10000000 e_off"]);
+}
+
 #[test]
 fn switching_forgets_the_history() {
     let mut m = monitor(for_at_least(above("A.x", 1.0), 100));

@@ -95,6 +95,7 @@ fn catalogue() -> Catalogue {
         min: None,
         max: None,
         tunable,
+        raises: false,
         unit: None,
         doc: String::new(),
         origin: Origin::NONE,

@@ -1,4 +1,5 @@
-//! A coordinator in the JSON of rFSM's `rfsm2json`, version 2: the graph as `model2tab` gives it, and where it stands.
+//! A coordinator in the form of rFSM's `rfsm2json`, version 2: the graph as `model2tab` gives it, but each transition under the state that it leads
+//! from and not in whose table it is written; and where it stands.
 
 use crate::draw::text::raised;
 use crate::model::Statechart;

@@ -1,6 +1,6 @@
 //! Signals into a file.
 
-use crate::model::Tunable;
+use crate::model::{SampleText, Tunable};
 use crate::runtime::{Builder, Component, Context, Failure, HookResult, In, Prop};
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -62,7 +62,7 @@ impl CsvLogger {
         write!(file, "{time}")?;
         for column in &mut self.columns {
             match column.get() {
-                Some(value) => write!(file, ",{value}")?,
+                Some(value) => write!(file, ",{}", SampleText(value))?,
                 None => file.write_all(b",")?,
             }
         }

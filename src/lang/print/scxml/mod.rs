@@ -118,12 +118,10 @@ impl ScxmlWriter<'_> {
         }
         let timers = self.timers(at);
         let configs: Vec<&str> = state.config.iter().map(|(id, _)| id.as_str()).collect();
-        if !state.entry.is_empty() || !configs.is_empty() || !timers.is_empty() || !composite {
+        // In a block of its own, and first: of what stands behind something that cannot be sent, since there is no parent, an interpreter does
+        // nothing more.
+        if !timers.is_empty() || !composite {
             self.line(depth + 1, "<onentry>");
-            self.actions(depth + 2, &state.entry);
-            for id in &configs {
-                self.line(depth + 2, &format!("<send event=\"{id}\" target=\"#_parent\" davit:config=\"true\"/>"));
-            }
             for (event, delay) in &timers {
                 let event = quoted(event);
                 let delay = match delay {
@@ -144,6 +142,14 @@ impl ScxmlWriter<'_> {
             } else if !composite {
                 let done = plain_event(&format!("e_done@{}", item.fqn));
                 self.line(depth + 2, &format!("<raise event=\"{}\" davit:done=\"true\"/>", quoted(&done)));
+            }
+            self.line(depth + 1, "</onentry>");
+        }
+        if !state.entry.is_empty() || !configs.is_empty() {
+            self.line(depth + 1, "<onentry>");
+            self.actions(depth + 2, &state.entry);
+            for id in &configs {
+                self.line(depth + 2, &format!("<send event=\"{id}\" target=\"#_parent\" davit:config=\"true\"/>"));
             }
             self.line(depth + 1, "</onentry>");
         }
