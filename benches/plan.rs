@@ -45,6 +45,7 @@ fn catalogue() -> Arc<Catalogue> {
             min: None,
             max: None,
             tunable: Tunable::Stopped,
+            raises: false,
             unit: None,
             doc: String::new(),
             origin: Origin::NONE,

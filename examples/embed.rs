@@ -67,14 +67,12 @@ fn pump() -> ComponentType {
     let mut ty = ComponentType::new("Pump", "Moves water.");
     ty.actuator = true;
     let flow = PropertyType {
-        ty: ValueType::Float,
         default: Some(Value::Float(0.0)),
         min: Some(0.0),
         max: Some(10.0),
-        tunable: Tunable::Always,
         unit: Some("l/s".into()),
         doc: "How much of it.".to_owned(),
-        origin: Default::default(),
+        ..PropertyType::new(ValueType::Float, Tunable::Always)
     };
     ty.properties.insert("flow".parse().expect("a name"), flow);
     ty
