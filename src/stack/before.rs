@@ -128,12 +128,16 @@ impl BeforeEmergency {
         true
     }
 
-    /// How the picture differs from that of then. None: that cannot be told. What came since may have found what it wants already, and keeps
-    /// that: nothing is said of what it is about.
-    pub fn left(&mut self, system: &System, now: &Stack, context: &PlanContext) -> Option<(&System, Vec<Step>)> {
+    /// How the picture differs from that of then, and how it would be without that difference. None: that cannot be told. What came since may
+    /// have found what it wants already, and keeps that: nothing is said of what it is about, and that is as it is.
+    pub fn left(&mut self, system: &System, now: &Stack, context: &PlanContext) -> Option<(System, Vec<Step>)> {
         self.goes_with(now, context).then(|| {
-            let difference = self.difference(&self.system, system, &self.beyond(now));
-            (&self.system, difference)
+            let beyond = self.beyond(now);
+            let mut wanted = system.clone();
+            let back = self.difference(system, &self.system, &beyond);
+            // What cannot be done without something of which nothing is said is told, and stays.
+            back.iter().for_each(|step| drop(step::apply(step, &mut wanted)));
+            (wanted, self.difference(&self.system, system, &beyond))
         })
     }
 

@@ -324,6 +324,24 @@ fn what_it_connects_in_the_middle_of_a_hot_swap_is_let_go_of() {
     }
 }
 
+/// What an operator has set meanwhile stays, also where something else of the same component is put right.
+#[test]
+fn what_was_set_meanwhile_stays_where_the_rest_is_put_right() {
+    let of = CASES.iter().find(|case| case.what.ends_with("that another one interrupts"));
+    let demo = demo(&of.expect("the case").configurations);
+    demo.write(
+        "s.lua",
+        "deploy('over.yaml') wait(0.2) fault('stop n', 'slow', 1, 0.3) raise('e_stop') wait(1) apply('slow', { force = true }) wait(0.1)
+         raise('e_halt') wait(5) set('m.limit', 0.9, { force = true, within = 1 }) raise('e_reset') wait(3)
+         undo('slow', { force = true }) wait(1) say('before ' .. state('m')) recover('back') wait(1)
+         say('m ' .. state('m') .. ' limit ' .. property('m.limit') .. ' ' .. #drift()) shutdown{ force = true }",
+    );
+    let ran = demo.run(&["run", "s.lua", "--clock", "simulated", "--quiet"]);
+    let found: Vec<&str> =
+        ran.out.lines().filter(|line| line.starts_with("m ") || line.starts_with("before ")).collect();
+    assert_eq!(found, ["before stopped", "m running limit 0.9 0"], "{}{}", ran.out, ran.err);
+}
+
 /// Each subsystem has an emergency of its own: what a sibling is just doing, or has broken, is no matter of it.
 #[test]
 fn what_goes_on_in_a_sibling_is_no_matter_of_it() {
