@@ -89,7 +89,9 @@ impl BeforeEmergency {
 
     /// Somebody makes what is in force of theirs permanent: it stays, also what came since.
     pub fn is_permanent(&mut self, now: &Stack, by: Requester) {
-        self.since(now).filter(|frame| frame.requester == by).for_each(|frame| self.unknown.add(frame));
+        let first = self.stack.next();
+        let came = now.frames().iter().filter(|frame| frame.id >= first && frame.requester == by);
+        came.for_each(|frame| self.unknown.add(frame));
         self.stack.make_permanent(by);
         self.looked_at = None;
     }
@@ -155,7 +157,8 @@ impl BeforeEmergency {
         let mut steps = system::diff(from, to);
         steps.retain(|step| {
             let components = touch::components(step);
-            let is_about = components.iter().any(|name| self.is_about(*name));
+            // What is connected across is its parent's matter.
+            let is_about = components.iter().all(|name| self.is_about(*name));
             is_about && !beyond.has(step, from) && !components.into_iter().any(is_faulted)
         });
         steps
@@ -172,6 +175,10 @@ impl BeforeEmergency {
         self.looked_at = Some(picture);
         let mut safe = now.frames().iter().filter(|frame| frame.safe && self.concerns(frame));
         let frame = safe.next().filter(|frame| known && safe.next().is_none() && !frame.partial)?.clone();
+        // That of a parent leads back elsewhere as well.
+        if !self.covers(frame.configuration.prefix()) {
+            return None;
+        }
         let led = transaction(system, now, &[Op::Undo(frame.id)], context).ok().and_then(|planned| {
             let mut led = system.clone();
             planned.steps.iter().try_for_each(|planned| step::apply(&planned.step, &mut led).ok().map(drop))?;
