@@ -20,7 +20,8 @@ impl Engine {
         let World { stack, system, .. } = &self.world;
         let before = BeforeEmergency::new(path, stack, without.unwrap_or(system).clone());
         // Of what goes on beside it nobody knows yet what it will have been.
-        let is_safe = stack.frames().iter().any(|frame| frame.safe && concerns(frame, path));
+        let own = |frame: &crate::stack::Frame| frame.configuration.prefix() == path;
+        let is_safe = stack.frames().iter().any(|frame| frame.safe && own(frame) && concerns(frame, path));
         if covered || is_safe || !self.is_settled(&before, true) {
             return;
         }
@@ -69,7 +70,7 @@ impl Engine {
             let emergency = &self.emergencies[at];
             if !self.is_settled(emergency, false) {
                 at += 1;
-            } else if self.world.stack.frames().iter().any(|frame| frame.safe && emergency.concerns(frame)) {
+            } else if self.world.stack.frames().iter().any(|frame| emergency.has(frame)) {
                 let World { stack, system, .. } = &mut self.world;
                 if let Some(frame) = self.emergencies[at].leading_back(system, stack, &self.given.context) {
                     stack.replace(frame);

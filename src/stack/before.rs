@@ -81,6 +81,11 @@ impl BeforeEmergency {
         concerns(frame, self.path)
     }
 
+    /// Whether that is something safe of it: not of one inside of it that was in force before.
+    pub fn has(&self, frame: &Frame) -> bool {
+        frame.safe && frame.id >= self.stack.next() && self.concerns(frame)
+    }
+
     /// Nothing is known any more of a component that has failed meanwhile: nobody's undo brings it back.
     pub fn has_failed(&mut self, component: ComponentName) {
         self.unknown.components.insert(component);
@@ -173,7 +178,7 @@ impl BeforeEmergency {
         }
         let known = self.goes_with(now, context);
         self.looked_at = Some(picture);
-        let mut safe = now.frames().iter().filter(|frame| frame.safe && self.concerns(frame));
+        let mut safe = now.frames().iter().filter(|frame| self.has(frame));
         let frame = safe.next().filter(|frame| known && safe.next().is_none() && !frame.partial)?.clone();
         // That of a parent leads back elsewhere as well.
         if !self.covers(frame.configuration.prefix()) {
