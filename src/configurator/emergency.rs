@@ -6,7 +6,7 @@ use super::repair::By;
 use super::request::Reason;
 use super::running::Running;
 use crate::model::{ComponentName, ConfigId};
-use crate::stack::{BeforeEmergency, Broken, Requester, Residual, World, concerns};
+use crate::stack::{BeforeEmergency, Broken, Requester, Residual, World};
 use crate::system::{System, touch};
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -20,8 +20,7 @@ impl Engine {
         let World { stack, system, .. } = &self.world;
         let before = BeforeEmergency::new(path, stack, without.unwrap_or(system).clone());
         // Of what goes on beside it nobody knows yet what it will have been.
-        let own = |frame: &crate::stack::Frame| frame.configuration.prefix() == path;
-        let is_safe = stack.frames().iter().any(|frame| frame.safe && own(frame) && concerns(frame, path));
+        let is_safe = stack.frames().iter().any(|frame| frame.safe && frame.configuration.prefix() == path);
         if covered || is_safe || !self.is_settled(&before, true) {
             return;
         }

@@ -68,7 +68,7 @@ impl BeforeEmergency {
 
     /// Whether what is called so is a matter of it.
     pub fn is_about(&self, component: ComponentName) -> bool {
-        is_in(component, self.path)
+        is_within(component.as_str(), self.path)
     }
 
     /// The same of something safe.
@@ -78,7 +78,7 @@ impl BeforeEmergency {
 
     /// Whether a frame does something to what it is about, or means to.
     pub fn concerns(&self, frame: &Frame) -> bool {
-        concerns(frame, self.path)
+        self.covers(frame.configuration.as_str()) || touched(frame).any(|component| self.is_about(component))
     }
 
     /// Whether that is something safe of it: not of one inside of it that was in force before.
@@ -111,13 +111,8 @@ impl BeforeEmergency {
     /// cannot be told how that would be.
     fn goes_with(&mut self, now: &Stack, context: &PlanContext) -> bool {
         // What is squashed is in force, and nobody can take it out alone.
-        let squashed = |frame: &&Arc<Frame>| frame.is_squashed();
-        if now
-            .frames()
-            .iter()
-            .filter(squashed)
-            .any(|frame| self.stack.frame(frame.id).is_none_or(|of| !of.is_squashed()))
-        {
+        let is_new = |frame: &Frame| self.stack.frame(frame.id).is_none_or(|of| !of.is_squashed());
+        if now.frames().iter().any(|frame| frame.is_squashed() && is_new(frame)) {
             return false;
         }
         let gone = |frame: &&Arc<Frame>| now.frame(frame.id).is_none() && self.concerns(frame);
@@ -238,15 +233,6 @@ impl BeforeEmergency {
             _ => None,
         }
     }
-}
-
-fn is_in(component: ComponentName, path: &str) -> bool {
-    is_within(component.as_str(), path)
-}
-
-/// Whether a frame does something to what is in a (sub)system, or belongs to it.
-pub fn concerns(frame: &Frame, path: &str) -> bool {
-    is_within(frame.configuration.as_str(), path) || touched(frame).any(|component| is_in(component, path))
 }
 
 /// Whether two frames are about a component that is the same.

@@ -40,7 +40,7 @@ mod world;
 pub use self::{net::reduce, permanent::may_commit, pile::Pile};
 pub use answer::{Answer, Reason, Residual, TakenAlong};
 pub use batch::{Group, Rules, Told, held, may_apply, take_up};
-pub use before::{BeforeEmergency, concerns};
+pub use before::BeforeEmergency;
 pub use desk::{ActiveBatch, Arrival, Arrived, Desk, GivenUp, Gone, given_up_of};
 pub use effort::{BestEffort, effort};
 pub use keep::keeps_still;

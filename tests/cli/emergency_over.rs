@@ -253,9 +253,8 @@ fn where_something_ordinary_of_its_group_was_in_force_it_is_as_without_that() {
 }
 
 fn ends_as_before(Case { what, configurations, comes, told }: &Case, first: &str) {
-    {
-        let demo = demo(configurations);
-        demo.write(
+    let demo = demo(configurations);
+    demo.write(
             "s.lua",
             &format!(
                 "local function same(a, b)
@@ -274,11 +273,10 @@ fn ends_as_before(Case { what, configurations, comes, told }: &Case, first: &str
                    .. (told and ' ' .. told or '')) shutdown()"
             ),
         );
-        let ran = demo.run(&["run", "s.lua", "--clock", "simulated", "--quiet"]);
-        let said = ran.out.lines().find(|line| line.starts_with("true ") || line.starts_with("false "));
-        let expected = format!("true 0 2 {told}");
-        assert_eq!((said, ran.code), (Some(expected.as_str()), 0), "{what} {first}: {}{}", ran.out, ran.err);
-    }
+    let ran = demo.run(&["run", "s.lua", "--clock", "simulated", "--quiet"]);
+    let said = ran.out.lines().find(|line| line.starts_with("true ") || line.starts_with("false "));
+    let expected = format!("true 0 2 {told}");
+    assert_eq!((said, ran.code), (Some(expected.as_str()), 0), "{what} {first}: {}{}", ran.out, ran.err);
 }
 
 /// The end of an emergency moves what that had moved itself, and nothing else: what somebody's undo has left so is for who asks for that.
@@ -342,11 +340,8 @@ fn what_was_set_meanwhile_stays_where_the_rest_is_put_right() {
     assert_eq!(found, ["before stopped", "m running limit 0.9 0"], "{}{}", ran.out, ran.err);
 }
 
-/// Each subsystem has an emergency of its own: what a sibling is just doing, or has broken, is no matter of it.
-#[test]
-fn what_goes_on_in_a_sibling_is_no_matter_of_it() {
-    let frees = "changes: [{ disconnect: { from: l.o, to: m.ref } }, { port_write: { port: m.ref, value: 0.0 } }]";
-    let demo = demo(&["post_conf_state: [\"m:running\"]", LIMIT, QUICK, frees, STILL]);
+/// Two of them, and what their parent applies when it hears `e_cut`, which `e_mend` ends.
+fn pair(demo: &Demo, cut: &str) {
     demo.write(
         "pair.yaml",
         "davit: 1
@@ -354,34 +349,75 @@ name: pair
 platform: simulated
 types: {}
 subsystems: { left: { deployment: over.yaml }, right: { deployment: over.yaml } }
-configurations: [nothing.yaml]
+configurations: [parent.yaml]
 coordinator: both.yaml
 safety: [e_stop, e_halt]
 deploy: { event: e_go, up: on, failed: [failed], within_s: 10 }
 shutdown: { event: e_down, down: idle, within_s: 20 }
 ",
     );
-    demo.write("nothing.yaml", "configurations: {}\n");
+    demo.write("parent.yaml", &format!("configurations: {{ cut: {{ safe: true, group: cut, {cut} }} }}\n"));
     demo.write(
         "both.yaml",
         "coordinator:
-  states: { idle: {}, a: { entry: left/e_start }, b: { entry: right/e_start }, on: {}, failed: {}, c: { entry: left/e_end }, d: { entry: right/e_end } }
+  states:
+    idle: {}
+    up:
+      states: { a: { entry: left/e_start }, b: { entry: right/e_start } }
+      transitions: [{ src: initial, tgt: a }, { src: a, tgt: b, events: [left/up] }]
+    on: {}
+    held: { config: cut }
+    mending: {}
+    letting: {}
+    failed: {}
+    c: { entry: left/e_end }
+    d: { entry: right/e_end }
   transitions:
     - { src: initial, tgt: idle }
-    - { src: idle, tgt: a, events: [e_go] }
-    - { src: a, tgt: b, events: [left/up] }
-    - { src: b, tgt: on, events: [right/up] }
-    - { src: a, tgt: failed, events: [left/failed] }
-    - { src: b, tgt: failed, events: [right/failed] }
-    - { src: [a, b, on, failed], tgt: c, events: [e_down] }
+    - { src: idle, tgt: up, events: [e_go] }
+    - { src: up, tgt: on, events: [right/up] }
+    - { src: up, tgt: failed, events: [left/failed, right/failed] }
+    - { src: on, tgt: held, events: [e_cut] }
+    - { src: held, tgt: mending, events: [e_mend] }
+    - { src: held, tgt: letting, events: [e_down] }
+    - { src: mending, tgt: on, events: [cut.undone, cut.undo.failed, cut.undo.broken] }
+    - { src: mending, tgt: letting, events: [e_down] }
+    - { src: letting, tgt: c, events: [cut.undone, cut.undo.failed, cut.undo.broken] }
+    - { src: up, tgt: c, events: [e_down] }
+    - { src: on, tgt: c, events: [e_down] }
+    - { src: failed, tgt: c, events: [e_down] }
     - { src: c, tgt: d, events: [left/down, left/e_end.ignored] }
     - { src: d, tgt: idle, events: [right/down, right/e_end.ignored] }
-"
-        .replace("    - { src: [a, b, on, failed], tgt: c, events: [e_down] }\n", &["a", "b", "on", "failed"].map(|src| {
-            format!("    - {{ src: {src}, tgt: c, events: [e_down] }}\n")
-        }).concat())
-        .as_str(),
+",
     );
+}
+
+/// What a parent has made safe in two subsystems is all taken back, also where one of these had an emergency of its own meanwhile.
+#[test]
+fn what_a_parent_has_made_safe_is_its_own_matter() {
+    let leads_down = "post_conf_state: [\"m:unconfigured\"]";
+    let demo = demo(&["post_conf_state: [\"m:stopped\"]", LIMIT, QUICK, leads_down, NOTHING]);
+    demo.write("over.yaml", &format!("{DEPLOYMENT}exports: {{ properties: {{ limit: n.limit }} }}\n"));
+    let set = |of: &str| format!("{{ property_set: {{ property: {of}.limit, value: 0.2 }} }}");
+    pair(&demo, &format!("changes: [{}, {}]", set("left"), set("right")));
+    demo.write(
+        "s.lua",
+        "deploy('pair.yaml') wait(0.2) raise('e_stop', { to = { 'left' } }) wait(1) raise('e_cut') wait(1)
+         raise('e_halt', { to = { 'left' } }) raise('e_stop', { to = { 'left' } }) wait(1) raise('left/e_reset') wait(1)
+         raise('e_mend') wait(1)
+         say('n ' .. property('left/n.limit') .. ' ' .. property('right/n.limit') .. ' ' .. #drift()) shutdown()",
+    );
+    let ran = demo.run(&["run", "s.lua", "--clock", "simulated", "--quiet"]);
+    let found = ran.out.lines().find(|line| line.starts_with("n "));
+    assert_eq!((found, ran.code), (Some("n 0.5 0.5 0"), 0), "{}{}", ran.out, ran.err);
+}
+
+/// Each subsystem has an emergency of its own: what a sibling is just doing, or has broken, is no matter of it.
+#[test]
+fn what_goes_on_in_a_sibling_is_no_matter_of_it() {
+    let frees = "changes: [{ disconnect: { from: l.o, to: m.ref } }, { port_write: { port: m.ref, value: 0.0 } }]";
+    let demo = demo(&["post_conf_state: [\"m:running\"]", LIMIT, QUICK, frees, STILL]);
+    pair(&demo, "");
     for busy in
         ["", "fault('property_set right/m.limit', 'slow', 1, 0.8)", "fault('property_set right/m.limit', 'late', 1)"]
     {
@@ -415,6 +451,10 @@ fn what_was_accepted_meanwhile_stays() {
             "set('m.limit', 0.9, { force = true, within = 1 }) raise('e_stop') wait(1) commit{ force = true } wait(1)
              raise('e_reset') wait(1)",
             "m running n running l x, limit 0.9, told 0",
+        ),
+        (
+            "apply('stop', { force = true }) wait(1) commit{ force = true } wait(1)",
+            "m stopped n running l x, limit 0.5, told 0",
         ),
         (
             "raise('e_halt') wait(1) set('m.limit', 0.9, { force = true, within = 1 }) commit{ force = true } wait(1) fault('stop m', 'slow', 1, 0.3)
