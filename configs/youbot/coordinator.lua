@@ -377,7 +377,10 @@ return state {
   trans { src = "operational", tgt = "fault",
           events = { "e_drives_let_go", "five_DOF.failed", "five_DOF.broken", "eight_DOF.broken", "base_stop.failed", "base_stop.broken",
                      "enable_copying.broken", "disable_copying.failed", "disable_copying.broken" } },
-  trans { src = "operational", tgt = "fault.losing", events = { "e_controller_lost" } },
+  trans { src = "operational.unsync", tgt = "fault.losing", events = { "e_controller_lost" } },
+  trans { src = "operational.sync",   tgt = "fault.losing", events = { "e_controller_lost" } },
+  -- Somebody has to release a soft stop: it does not end since the controller died in it.
+  trans { src = "operational.soft_stop", tgt = "fault", events = { "e_controller_lost" } },
   trans { src = "fault.resuming",            tgt = "operational.unsync.for_five", events = { "resume.ok" } },
   trans { src = "fault.resuming",            tgt = "shutting_down", events = { "e_shutdown" } },
   trans { src = "fault.releasing.leaving",   tgt = "shutting_down.quieting.released", events = { "safe_hold.undone" } },

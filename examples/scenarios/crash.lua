@@ -60,3 +60,20 @@ for _, dead in ipairs(DEAD) do
   wait_state("pair:idle", 20)
   assert(#stack() == 0, "something is left")
 end
+
+-- In a soft stop, which people have to release, it is not: nothing couples since the controller died.
+raise("e_start")
+wait_state("left:copying", 20)
+set("left/Cart_Impedance.offset", { 0.3, 0, 0 }, { force = true, within = 1 })
+wait_state("left:soft_stop", 0.1)
+undo("left/Cart_Impedance.offset")
+wait(0.5)
+inject("left/Cart_Impedance", "panic")
+wait_state("left:fault", 0.06)
+wait(5)
+wait_state("left:fault.waiting", 0)
+local at = now()
+raise("left/e_reset")
+wait_state("left:harmonizing", 2)
+assert_running("left/Cart_Impedance")
+expect{ name = "dead in a soft stop: harmonizing, released, after", value = 1000 * (now() - at), max = 1000, unit = "ms" }

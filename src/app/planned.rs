@@ -4,7 +4,7 @@ use super::Read;
 use crate::check::{self, Drive, Until, WayEvent};
 use crate::model::codes::{CLI_UNKNOWN_CONFIGURATION, DEPLOY_NEVER_DOWN, DEPLOY_NEVER_UP, UNKNOWN_COMPONENT};
 use crate::model::finding::{configuration, did_you_mean, has_errors};
-use crate::model::{Ask, ChangeKind, ConfigId, Configuration, Deployment, Finding, Findings, Ident, Snapshot};
+use crate::model::{Ask, ComponentName, ConfigId, Configuration, Deployment, Finding, Findings, Ident, Snapshot};
 use crate::plan::{PlanContext, PlannedStep};
 use crate::stack::{Op, Requester, Stack, transaction};
 use crate::system::{System, step};
@@ -51,11 +51,20 @@ pub fn wrong_in_others(read: &Read, told: &[Finding]) -> Findings {
 
 /// Planning begins with nothing deployed: what creates what is not there then has to be named, too.
 fn begins_with_nothing(deployment: &Deployment, id: ConfigId, findings: &mut [Finding]) {
-    let creates = |c: &&Configuration| c.changes.iter().any(|change| matches!(change.kind, ChangeKind::Create { .. }));
-    // A subsystem's components are made by its own file.
-    let creators = deployment.configurations.iter().filter(creates).filter(|c| c.id.prefix() == id.prefix());
-    let creators = creators.map(|c| c.id.as_str()).filter(|c| *c != id.as_str());
-    let creators: Vec<&str> = creators.take(3).collect();
+    let others = || deployment.configurations.iter().filter(|c| c.id != id);
+    let creates = |c: &Configuration, is: &dyn Fn(ComponentName) -> bool| {
+        c.changes.iter().filter_map(|change| change.kind.makes()).any(|(component, ..)| is(component))
+    };
+    let missing = |component: ComponentName| {
+        let named = format!("`{component}`");
+        findings.iter().any(|finding| finding.code == UNKNOWN_COMPONENT && finding.message.contains(&named))
+    };
+    let mut creators: Vec<&str> = others().filter(|c| creates(c, &missing)).map(|c| c.id.as_str()).collect();
+    // What nothing creates may be a slip: then what the same file creates is shown.
+    if creators.is_empty() {
+        let own = others().filter(|c| c.id.prefix() == id.prefix() && creates(c, &|_| true));
+        creators = own.map(|c| c.id.as_str()).take(3).collect();
+    }
     for finding in findings.iter_mut().filter(|f| f.code == UNKNOWN_COMPONENT && !creators.is_empty()) {
         finding.help = Some(format!(
             "configurations are planned one after the other, beginning with nothing deployed: name what creates it before, as in `{} {id}`",

@@ -2,12 +2,13 @@
 
 use super::Checked;
 use crate::functions::HostFunction;
+use crate::lang::schema::{OptionName, PlatformNames, ProgramNames};
 use crate::model::codes::{DEPLOY_PLATFORM_OPTION, DEPLOY_UNKNOWN_PLATFORM};
 use crate::model::finding::did_you_mean;
 use crate::model::{Deployment, Finding, Findings, Ident, PlatformKind, Value, ValueType};
 use crate::platform::Platform;
 use crate::platform::embedded::EmbeddedPlatform;
-use crate::runtime::Libraries;
+use crate::runtime::{Libraries, Library};
 use crate::time::Clock;
 use std::collections::BTreeMap;
 use std::fmt;
@@ -65,6 +66,24 @@ impl Extensions {
     /// The names of its platforms.
     pub fn platforms(&self) -> impl Iterator<Item = &str> {
         self.platforms.iter().map(|platform| platform.name.as_str())
+    }
+
+    /// What its files may name that no file declares, for the schema.
+    pub(crate) fn names(&self) -> ProgramNames {
+        let option = |option: &PlatformOption| OptionName {
+            name: option.name,
+            ty: option.ty.clone(),
+            required: option.default.is_none(),
+            doc: option.doc.clone(),
+        };
+        let platform =
+            |of: &PlatformMaker| PlatformNames { name: of.name, options: of.options.iter().map(option).collect() };
+        let types = self.libraries.iter().flat_map(|library| library.kinds());
+        ProgramNames {
+            platforms: self.platforms.iter().map(platform).collect(),
+            libraries: self.libraries.iter().map(Library::name).collect(),
+            types: types.map(|kind| kind.ty.name).collect(),
+        }
     }
 
     /// The platform that a deployment names, which then knows its kind and all its options; or why there is none.

@@ -23,7 +23,7 @@ mod waits;
 use super::{Extensions, Refused};
 use crate::check::Far;
 use crate::diagnostics::{Language, SourceMap};
-use crate::functions::message_within;
+use crate::functions::{self, message_within};
 use crate::lang::{self, LoadOptions, Sources, UnknownName};
 use crate::limits;
 use crate::model::codes::LUA_UNDEFINED;
@@ -167,7 +167,7 @@ pub fn run(path: &Path, options: ScriptOptions) -> ScriptEnd {
         not_injected: Vec::new(),
         scene: None,
     }));
-    let driven = catch_unwind(AssertUnwindSafe(|| execute(path, text.as_bytes(), &host)));
+    let driven = catch_unwind(AssertUnwindSafe(|| execute(path, &text, &host)));
     // What panicked may have it borrowed, and its Lua state may live on: the session is taken out either way.
     let failure = match driven {
         Ok(driven) => driven.err(),
@@ -196,7 +196,7 @@ pub fn run(path: &Path, options: ScriptOptions) -> ScriptEnd {
     ScriptEnd { failure, ended: host.ended, scene, figures: host.figures, samples: host.recordings.into_all() }
 }
 
-fn execute(path: &Path, text: &[u8], host: &SharedHost) -> Result<(), ScriptFailure> {
+fn execute(path: &Path, text: &str, host: &SharedHost) -> Result<(), ScriptFailure> {
     // It fails by the refusal of a deployment only where it has let that through: one that it caught is its own affair.
     let failed = |error: mlua::Error| match error.chain().any(|error| error.is::<IsRefused>()) {
         true if host.borrow().refused.is_some() => {
@@ -208,22 +208,21 @@ fn execute(path: &Path, text: &[u8], host: &SharedHost) -> Result<(), ScriptFail
             message: message_within(&error, limits::SCRIPT_MEMORY),
         },
     };
-    if let Some(again) = std::str::from_utf8(text).ok().and_then(lang::key_again) {
+    if let Some(again) = lang::key_again(text) {
         let message = format!("{}:{again}", path.display());
         return Err(ScriptFailure::Lua { message, syntax: true });
     }
     let (lua, guards) = sandbox::state().map_err(failed)?;
     install(&lua, host).map_err(failed)?;
     guards.budget.count.interrupted_by(interrupt(host).asked());
-    let chunk = lua.load(sandbox::without_hash_bang(text)).set_name(format!("@{}", path.display()));
+    let chunk = lua.load(functions::without_hash_bang(text)).set_name(format!("@{}", path.display()));
     let script = chunk.set_mode(mlua::chunk::ChunkMode::Text).into_function().map_err(failed)?;
     no_unknown_names(path, text, &lua)?;
     guards.budget.spend(limits::SCRIPT_INSTRUCTIONS, || script.call::<()>(())).map_err(failed)
 }
 
 /// A misspelt name is told before anything is brought up, and not in the middle of it.
-fn no_unknown_names(path: &Path, text: &[u8], lua: &Lua) -> Result<(), ScriptFailure> {
-    let Ok(text) = std::str::from_utf8(text) else { return Ok(()) };
+fn no_unknown_names(path: &Path, text: &str, lua: &Lua) -> Result<(), ScriptFailure> {
     let globals = lua.globals();
     let known = |name: &str| globals.raw_get::<LuaValue>(name).is_ok_and(|value| !value.is_nil());
     let unknown = lang::unknown_names(text, known);

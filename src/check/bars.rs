@@ -16,7 +16,8 @@ use std::collections::BTreeMap;
 impl Graph<'_, '_> {
     /// Of each edge, why it leads no deployment down that is being stopped.
     pub(super) fn bars(&mut self) -> Vec<Option<Barred>> {
-        let people = self.stands_still();
+        let (safe, below) = (self.stands_still(), self.waits_below());
+        let people: Vec<bool> = safe.into_iter().zip(below).map(|(safe, below)| safe || below).collect();
         let shutdown = self.product.deployment.shutdown.event;
         let unknown = self.product.children.iter().any(|child| child.beliefs.is_none());
         let mut bars: Vec<Option<Barred>> = Vec::with_capacity(self.edges.len());

@@ -151,7 +151,8 @@ fn raised(deployment: &Deployment, chart: &Chart, known: &KnownEvents<'_>, findi
         let (id, undo) = site.name.as_str().strip_suffix(".undo").map_or((site.name.as_str(), ""), |id| (id, ".undo"));
         let may_be_event = undo.is_empty() && !site.scoped;
         let (asked_for, emitted) = (asked_for(&ids, id), emits.iter().map(|e| e.as_str()).filter(|_| may_be_event));
-        let help = did_you_mean(id, "configurations", asked_for.iter().map(String::as_str).chain(emitted));
+        let what = if may_be_event { "configurations and events" } else { "configurations" };
+        let help = did_you_mean(id, what, asked_for.iter().map(String::as_str).chain(emitted));
         let message = if site.scoped || !undo.is_empty() {
             format!("there is no configuration `{id}`")
         } else {

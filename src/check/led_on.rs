@@ -6,52 +6,69 @@
 
 use super::coordinator::{ask_of, edges, place};
 use crate::model::codes::COORD_SAFE_LEFT;
-use crate::model::{Ask, ConfigId, Deployment, EventName, Finding, Findings, Verdict};
-use crate::statechart::{Chart, EdgeId, EventId, NodeId, NodeKind, RaiseMoment};
+use crate::model::{Ask, ConfigId, Deployment, EventName, Finding, Findings, Origin, Verdict};
+use crate::statechart::{Chart, EdgeId, EventId, NodeId, NodeKind, RaiseMoment, RaiseSite};
 use rustc_hash::FxHashSet;
 
-/// Transitions by which a state is left unasked that takes something safe back.
-pub fn check(deployment: &Deployment, chart: &Chart) -> Findings {
+/// A state that takes something safe back when it is left.
+pub struct HeldSafe {
+    /// The state.
+    state: NodeId,
+    /// What is safe.
+    id: ConfigId,
+    /// Where that is written.
+    at: Origin,
+}
+
+/// Those of a coordinator.
+pub fn held(deployment: &Deployment, chart: &Chart) -> Vec<HeldSafe> {
     let is_safe = |id: ConfigId| deployment.configuration(id).is_some_and(|of| of.safe);
-    let asks = |node: NodeId| {
-        let asked = chart.raises().iter().filter(|site| site.when == RaiseMoment::Entry(node));
-        let mut ids = asked.filter_map(|site| match ask_of(deployment, site.name) {
-            Some(Ask::Apply(id)) => Some(id),
-            _ => None,
-        });
-        ids.any(is_safe)
-    };
-    let mut findings = Vec::new();
-    for site in chart.raises() {
-        let (RaiseMoment::Exit(state), Some(Ask::UndoOf(id))) = (site.when, ask_of(deployment, site.name)) else {
-            continue;
-        };
-        if !is_safe(id) {
-            continue;
+    let left = |site: &RaiseSite| match (site.when, ask_of(deployment, site.name)) {
+        (RaiseMoment::Exit(state), Some(Ask::UndoOf(id))) if is_safe(id) => {
+            Some(HeldSafe { state, id, at: site.origin })
         }
-        let leaves = |edge: &EdgeId| {
-            chart.is_inside(chart.ends(*edge).0, state) && !chart.is_inside(chart.least_common_ancestor(*edge), state)
+        _ => None,
+    };
+    chart.raises().iter().filter_map(left).collect()
+}
+
+impl HeldSafe {
+    /// Whether a transition leaves it, to where nothing safe is asked for.
+    pub fn is_left_by(&self, deployment: &Deployment, chart: &Chart, edge: EdgeId) -> bool {
+        let asks = |node: NodeId| {
+            let asked = chart.raises().iter().filter(|site| site.when == RaiseMoment::Entry(node));
+            let mut asked = asked.filter_map(|site| ask_of(deployment, site.name));
+            asked.any(|ask| matches!(ask, Ask::Apply(id) if deployment.configuration(id).is_some_and(|of| of.safe)))
         };
-        for edge in edges(chart).filter(leaves) {
+        chart.is_inside(chart.ends(edge).0, self.state)
+            && !chart.is_inside(chart.least_common_ancestor(edge), self.state)
+            && !ways_end_safe(chart, edge, &asks)
+    }
+}
+
+/// Transitions by which a state is left unasked that takes a safe configuration back.
+pub fn check(deployment: &Deployment, chart: &Chart) -> Findings {
+    let mut findings = Findings::new();
+    for held in held(deployment, chart) {
+        let HeldSafe { state, id, at } = held;
+        for edge in edges(chart).filter(|edge| held.is_left_by(deployment, chart, *edge)) {
             let Some(by) = unasked(chart, edge, id) else { continue };
-            if !ways_end_safe(chart, edge, &asks) {
-                let (_, target) = chart.ends(edge);
-                let message = format!(
-                    "{by} leads from `{}` to `{}`, which takes `{id}` back: nobody said that the emergency is over",
-                    chart.fqn(state),
-                    chart.fqn(target)
-                );
-                findings.push(
-                    Finding::warning(COORD_SAFE_LEFT, message)
-                        .at(chart.edge_origin(edge))
-                        .also(site.origin, "taken back by what is written here")
-                        .path(place(chart, RaiseMoment::Effect(edge)))
-                        .help(format!(
-                            "let an event of people lead on (`e_reset`), and hear `{id}.failed` and `{id}.broken` between two states inside of `{}`",
-                            chart.fqn(state)
-                        )),
-                );
-            }
+            let (_, target) = chart.ends(edge);
+            let message = format!(
+                "{by} leads from `{}` to `{}`, which takes `{id}` back: nobody said that the emergency is over",
+                chart.fqn(state),
+                chart.fqn(target)
+            );
+            findings.push(
+                Finding::warning(COORD_SAFE_LEFT, message)
+                    .at(chart.edge_origin(edge))
+                    .also(at, "taken back by what is written here")
+                    .path(place(chart, RaiseMoment::Effect(edge)))
+                    .help(format!(
+                        "let an event of people lead on (`e_reset`), and hear `{id}.failed` and `{id}.broken` between two states inside of `{}`",
+                        chart.fqn(state)
+                    )),
+            );
         }
     }
     findings

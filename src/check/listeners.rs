@@ -2,9 +2,11 @@
 
 use super::universe::Universe;
 use crate::model::codes::CONF_EVENT_UNHEARD;
-use crate::model::finding::did_you_mean;
+use crate::model::finding::{did_you_mean, nearest};
 use crate::model::statechart::is_internal;
-use crate::model::{ChangeKind, ComponentName, Deployment, EventName, Finding, Findings, Ident, Origin, Value};
+use crate::model::{
+    ChangeKind, ComponentName, ComponentType, Deployment, EventName, Finding, Findings, Ident, Origin, Value,
+};
 use crate::statechart::Chart;
 use std::collections::BTreeSet;
 
@@ -85,5 +87,24 @@ pub fn events(deployment: &Deployment, universe: &Universe, charts: &[&Chart]) -
         };
         findings.push(finding.at(at).labelled(format!("`{property}`")).help(help));
     }
+    findings.extend(deployment.types.iter().flat_map(|ty| misspelt(deployment, &listeners, ty)));
     findings
+}
+
+/// Events that a type of this file raises which nobody listens to, and a near one which no type raises is listened to. What is merely not
+/// listened to is no matter: a type is written for more than one system.
+fn misspelt(deployment: &Deployment, listeners: &Listeners<'_>, ty: &ComponentType) -> Findings {
+    let raised =
+        |event: &str| deployment.types.iter().any(|ty| ty.raises.keys().any(|raised| raised.as_str() == event));
+    let unheard = ty.raises.keys().filter(|event| !listeners.listen_to(**event));
+    let with_near = unheard.filter_map(|event| {
+        let others = listeners.heard.iter().copied().filter(|heard| !is_internal(heard) && !raised(heard));
+        let near = nearest(event.as_str(), others)?;
+        let path = format!("types.{}.raises", ty.name);
+        let at = deployment.key_origins.get(&path).copied().unwrap_or(ty.origin);
+        let message = format!("nobody listens to `{event}`, which components of the type `{}` raise", ty.name);
+        let help = format!("did you mean `{near}`?");
+        Some(Finding::warning(CONF_EVENT_UNHEARD, message).at(at).path(path).help(help))
+    });
+    with_near.collect()
 }

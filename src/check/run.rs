@@ -15,9 +15,9 @@ use super::report::{Accepted, Explored, Report};
 use super::state::Failed;
 use super::verdict::CheckVerdict;
 use super::{
-    alone, composed, configurations as single, coordinator, coupling, declared, interface, led_on, left_unanswered,
-    library, listeners, monitors as watched, moves_back, paths, purity, safety, settings, simulated, slips, types,
-    unasked, undriven, unhandled, universe, unwatched, ways,
+    alone, composed, configurations as single, coordinator, coupling, declared, interface, led_below, led_on,
+    left_unanswered, library, listeners, monitors as watched, moves_back, paths, purity, safety, settings, simulated,
+    slips, types, unasked, undriven, unhandled, universe, unwatched, ways,
 };
 use crate::model::codes::{CLASH, COORD_NO_WAY_DOWN, POST_ON_DESTROYED, PRE_ON_CREATED, TOUCHES_DESTROYED};
 use crate::model::naming::Naming;
@@ -116,6 +116,7 @@ fn run_one(
             findings.extend(led_on::check(view, chart));
             findings.extend(purity::check(view));
         }
+        findings.extend(led_below::check(deployment, &charts));
         // Another one may wait for what starts and ends the deployment, and tell the others.
         coupling::forgive_unheard(deployment, &charts, &mut findings);
         traced.extend(findings.into_iter().map(|finding| (finding, Vec::new())));

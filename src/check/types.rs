@@ -101,7 +101,8 @@ fn exclusive(deployment: &Deployment, ty: &ComponentType) -> Option<Finding> {
         Some(_) => format!("give `{property}` one of these types, or name the thing without it"),
         None => did_you_mean(property.as_str(), "properties", ty.properties.keys().map(Ident::as_str)),
     };
-    let finding = Finding::error(TYPE_EXCLUSIVE, format!("{}: `{resource}` is no name of one thing: {why}", ty.name));
+    let finding =
+        Finding::error(TYPE_EXCLUSIVE, format!("{}: `\"{resource}\"` is no name of one thing: {why}", ty.name));
     Some(finding.at(deployment.key_origins.get(&path).copied().unwrap_or(ty.origin)).path(path).help(help))
 }
 

@@ -157,10 +157,16 @@ impl Universe {
         let mut known: Vec<&str> = self.components.keys().map(ComponentName::as_str).filter_map(here).collect();
         known.sort_unstable();
         known.dedup();
+        // Names are those of a file: what there is beside it, a part of something larger, it does not see.
+        let help = match known.is_empty() && name.contains('/') {
+            true => "a file sees what is its own: what stands beside it comes by an in-port of it that whoever it is a part of connects (`exports`)"
+                .to_owned(),
+            false => did_you_mean(name, "components", known),
+        };
         Finding::error(UNKNOWN_COMPONENT, format!("no configuration creates a component `{component}`"))
             .at(at)
             .labelled("no such component")
-            .help(did_you_mean(component.as_str(), "components", known))
+            .help(help)
     }
 
     /// The finding that the component has no such member, whichever it may be created as. None also when one of its types

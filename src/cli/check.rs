@@ -4,11 +4,11 @@ use super::budget::{CheckBudget, Following};
 use super::exit::Exit;
 use super::input::CommandInput;
 use super::output::Style;
-use super::{CommandContext, CommandFailure, CommandResult, Run, replay};
+use super::{CommandContext, CommandFailure, CommandResult, Run, replay, write_output};
 use crate::check::{self, CheckVerdict, Effort, Explored, Report, TraceStep, why_no_way};
 use crate::diagnostics::{SourceMap, to_json};
 use crate::limits::{CHECK_FRAMES, CHECK_LEFT, CHECK_PILED};
-use crate::model::codes::CLI_WHICH_COORDINATOR;
+use crate::model::codes::{CLI_NO_FINDING, CLI_WHICH_COORDINATOR};
 use crate::model::finding::count as plural;
 use crate::model::{Deployment, Finding, Severity};
 use serde_json::json;
@@ -164,9 +164,11 @@ impl Args {
     ) -> CommandResult {
         let found = number.checked_sub(1).and_then(|at| Some((report.findings.get(at)?, report.traces.get(at)?)));
         let Some((finding, trace)) = found else {
-            let there = report.findings.len();
-            context.out.error(format!("there is no finding {number}: there are {there}, counted from 1\n"));
-            return Ok(Exit::Usage);
+            let help = match report.findings.len() {
+                0 => "there are none".to_owned(),
+                there => format!("give one from 1 to {there}, as they are listed without `--trace`"),
+            };
+            return Err(CommandFailure::usage(CLI_NO_FINDING, format!("there is no finding {number}"), help));
         };
         let Some(to) = &self.script else { return Ok(show_way(context, finding, trace, exit)) };
         let file = std::fs::canonicalize(&self.input.file).unwrap_or_else(|_| self.input.file.clone());
@@ -182,10 +184,7 @@ impl Args {
                 return Ok(Exit::No);
             }
         };
-        if let Err(e) = std::fs::write(to, text) {
-            context.out.error(format!("{}: {e}\n", to.display()));
-            return Ok(Exit::Usage);
-        }
+        write_output(context, Some(to), &text)?;
         let of = self.of.iter().map(|of| format!(" --of {of}")).collect::<String>();
         context.out.line(match alone {
             true => format!("{}: davit sim {}{of} --events {0}", to.display(), self.input.file.display()),

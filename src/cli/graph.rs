@@ -97,6 +97,13 @@ impl Run for Args {
                 "add `--what coordinator`; `davit status` shows components as they are now",
             ));
         }
+        if let (Some(of), false) = (&self.of, what == Drawn::Coordinator) {
+            return Err(CommandFailure::usage(
+                CLI_CONTRADICTS,
+                format!("`--of {of}` is one of the coordinators, and none are drawn"),
+                "add `--what coordinator`; `--in NAME` draws what belongs to a subsystem",
+            ));
+        }
         let picture = if what == Drawn::Coordinator {
             let mut all = coordinators(&self.file, &self.parameters, &self.inside, self.of.as_deref(), &[])?;
             if all.len() > 1 {

@@ -182,11 +182,7 @@ impl CommandFailure {
 
     /// Why, and what to do, in one sentence.
     pub fn message(&self) -> String {
-        let said = |finding: &Finding| match &finding.help {
-            Some(help) => format!("{}: {help}", finding.message),
-            None => finding.message.clone(),
-        };
-        self.findings.iter().map(said).collect::<Vec<_>>().join("; ")
+        self.findings.iter().map(Finding::in_a_line).collect::<Vec<_>>().join("; ")
     }
 }
 
@@ -203,7 +199,7 @@ pub fn write_output(context: &CommandContext, file: Option<&Path>, text: &str) -
         CommandFailure::usage(
             CLI_UNWRITABLE,
             format!("{}: {error}", file.display()),
-            "name a file in a directory that exists and may be written, or leave `-o` out to print",
+            "name a file in a directory that exists and may be written, or print it instead",
         )
     })
 }

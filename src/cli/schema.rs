@@ -46,7 +46,7 @@ impl Run for Args {
         let of = self.of.to_possible_value();
         let text = match of.and_then(|of| File::named(of.get_name())) {
             Some(file) if self.markdown => schema::markdown(file),
-            Some(file) => format!("{:#}\n", schema::json_schema(file)),
+            Some(file) => format!("{:#}\n", schema::json_schema(file, &context.extensions.names())),
             // Each page has both languages.
             None if self.markdown => {
                 let pages: Vec<_> = FILES.iter().filter(|file| file.in_lua).map(schema::markdown).collect();

@@ -5,7 +5,7 @@ use super::levels::{FilePart, each, folded, leaf, parts};
 use super::output::{Output, Style, Table};
 use super::status::{not_known, state_style, text};
 use crate::model::finding::count;
-use crate::session::StoppingView;
+use crate::session::{StandsStill, StoppingView};
 use serde_json::{Value as Json, json};
 
 /// Prints it; what is deeper than `depth` in a line each.
@@ -67,6 +67,11 @@ fn own(out: &Output, status: &Json, part: &FilePart<'_>, known: bool) -> String 
     {
         let still = stopping.stands_still().map(|still| format!(": stands still, {still}")).unwrap_or_default();
         line(format!("stopping     {}{still}", stopping.stage.words()));
+    }
+    if let Ok(still) = serde_json::from_value::<StandsStill>(status["stands_still"].clone())
+        && top
+    {
+        line(format!("stands still {still}"));
     }
     if top && status["left"].is_array() {
         let told = "its coordinators are down, and components are there: `davit shutdown` takes them away";

@@ -70,11 +70,14 @@ impl Host {
 /// Where a state keeps the module `rfsm`.
 pub const RFSM_KEY: &str = "davit.rfsm";
 
+/// The text without a first line `#!…`, which the shell reads and Lua does not; the end of that line stays, for the numbers of the others.
+pub fn without_hash_bang(text: &str) -> &str {
+    if text.starts_with('#') { &text[text.find('\n').unwrap_or(text.len())..] } else { text }
+}
+
 /// Runs a text as a file of that name.
 pub fn run(lua: &Lua, file: &str, text: &str) -> Result<MultiValue> {
-    // A first line `#!…` is blanked and not cut: lines keep their numbers.
-    let text = if text.starts_with('#') { &text[text.find('\n').unwrap_or(text.len())..] } else { text };
-    let chunk = lua.load(text).set_name(format!("@{file}")).set_mode(ChunkMode::Text);
+    let chunk = lua.load(without_hash_bang(text)).set_name(format!("@{file}")).set_mode(ChunkMode::Text);
     // Not `eval`, which tries the text as an expression first: a file never is one.
     chunk.into_function()?.call(())
 }

@@ -39,6 +39,7 @@ pub use budget::Budget;
 pub use count::{INTERRUPTED, processor_time};
 pub use errors::{Short, message_within, place_of, text_of};
 pub use guards::{Guards, install as guard, loops};
+pub use host::without_hash_bang;
 #[cfg(any(test, feature = "internals"))]
 pub use lab::Lab;
 pub use lower::{Problem, Spot};

@@ -44,6 +44,15 @@ impl Sources {
     /// # Errors
     /// A finding without a place.
     pub fn read(&self, path: &Path) -> Result<String, Box<Finding>> {
+        self.read_named(path, None)
+    }
+
+    /// The same of one that a file names, which is not meant itself.
+    ///
+    /// # Errors
+    /// A finding without a place.
+    pub fn read_named(&self, path: &Path, by: Option<&str>) -> Result<String, Box<Finding>> {
+        let near = |path: &Path| self.near(path, by);
         let shown = path.display();
         let refuse = |code: Code, message: String, help: String| Box::new(Finding::error(code, message).help(help));
         let too_large = || {
@@ -58,12 +67,12 @@ impl Sources {
             Self::Memory(files) => match files.get(&normal(path)) {
                 Some(bytes) if bytes.len() as u64 > limits::FILE_BYTES => return Err(too_large()),
                 Some(bytes) => bytes.clone(),
-                None => return Err(refuse(codes::TEXT_NO_FILE, format!("there is no file {shown}"), self.near(path))),
+                None => return Err(refuse(codes::TEXT_NO_FILE, format!("there is no file {shown}"), near(path))),
             },
             Self::Disk => {
                 let cannot = |error: std::io::Error| {
                     if error.kind() == std::io::ErrorKind::NotFound {
-                        refuse(codes::TEXT_NO_FILE, format!("there is no file {shown}"), self.near(path))
+                        refuse(codes::TEXT_NO_FILE, format!("there is no file {shown}"), near(path))
                     } else {
                         let help = "it must be a readable text file".to_owned();
                         refuse(codes::TEXT_UNREADABLE, format!("{shown} cannot be read: {error}"), help)
@@ -89,7 +98,9 @@ impl Sources {
                 bytes
             }
         };
-        String::from_utf8(bytes).map_err(|error| {
+        // Some editors begin a text with a mark of its encoding, which is none of its letters.
+        let text = |text: String| text.strip_prefix('\u{feff}').map_or_else(|| text.clone(), str::to_owned);
+        String::from_utf8(bytes).map(text).map_err(|error| {
             let valid = error.utf8_error().valid_up_to();
             let line = error.as_bytes()[..valid].iter().filter(|b| **b == b'\n').count() + 1;
             if error.as_bytes().starts_with(b"\x1bLua") {
@@ -120,7 +131,7 @@ impl Sources {
     }
 
     /// Files near to a name that does not exist: in its folder, else in that for deployments below it.
-    fn near(&self, path: &Path) -> String {
+    fn near(&self, path: &Path, by: Option<&str>) -> String {
         let folder = path.parent().map_or_else(PathBuf::new, Path::to_path_buf);
         let shown = if folder.as_os_str().is_empty() { Path::new(".") } else { &folder };
         let Some(names) = self.inside(shown) else { return format!("there is no folder {} either", shown.display()) };
@@ -128,8 +139,9 @@ impl Sources {
         let near = |names: &[String]| {
             // A script is meant where a script is looked for.
             let same = |name: &&str| language(Path::new(name)).is_some() && language(Path::new(name)) == language(path);
-            let alike: Vec<&str> = names.iter().map(String::as_str).filter(same).collect();
-            let all = || names.iter().map(String::as_str).collect();
+            let others = || names.iter().map(String::as_str).filter(|name| by != Some(*name));
+            let alike: Vec<&str> = others().filter(same).collect();
+            let all = || others().collect();
             did_you_mean(name, "files", if alike.is_empty() { all() } else { alike })
         };
         if !names.is_empty() {

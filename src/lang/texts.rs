@@ -42,7 +42,9 @@ pub(super) fn open(cx: &mut Cx, from: &Sources, path: &Path, named_at: Origin) -
         cx.refuse(Finding::error(codes::TEXT_UNKNOWN_LANGUAGE, message).at(named_at).help(help));
         return None;
     };
-    match from.read(path) {
+    let by = cx.sources.file_of(named_at).map(|file| cx.sources.file(file).name.clone());
+    let by = by.as_deref().and_then(|by| Path::new(by).file_name()).and_then(|name| name.to_str());
+    match from.read_named(path, by) {
         Ok(text) => {
             let file = cx.sources.add_file(from.shown(path), text, language);
             let whole = cx.sources.whole_file(file);

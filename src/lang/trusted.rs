@@ -284,9 +284,17 @@ fn refuse(cx: &mut Cx, ids: &FxHashMap<String, FileId>, reading: Reading, failur
     }
     if let Some(name) = &failure.missing {
         let place = cx.sources.within(at, name);
-        if is_of_another_file(name) {
-            let message = format!("`{name}` is of configurations or monitors, and this is read as a coordinator");
-            let help = "give the deployment's file (`deployments/NAME.yaml`); this one can be named in it";
+        let other = match name.as_str() {
+            // What every script begins with.
+            "deploy" => Some(("scripts", "`davit run` runs a script")),
+            name if is_of_another_file(name) => {
+                let help = "give the deployment's file (`deployments/NAME.yaml`); this one can be named in it";
+                Some(("configurations or monitors", help))
+            }
+            _ => None,
+        };
+        if let Some((of, help)) = other {
+            let message = format!("`{name}` is of {of}, and this is read as a coordinator");
             cx.report(Finding::error(codes::TEXT_NOTHING, message).at(place).labelled("used here").help(help));
             return;
         }

@@ -621,7 +621,9 @@ codes! {
          comes by itself: an answer of that configuration, a time, or whatever comes next; and what is entered asks for nothing safe. When a part of an \
          emergency stop fails (`stop.broken`), that undoes the part that was done: brakes open again, and nobody asked. Let an event of people lead on \
          (`e_reset`). What should be shown or told of how it ended is a transition between two states inside of the one that has the \
-         configuration: that stays in force.";
+         configuration: that stays in force. The same where a coordinator raises what ends an emergency of a subsystem, or of another coordinator, \
+         since an answer, a time or a report of a subsystem came: the event of safety may have come just before. Let it hear that event where it \
+         waits, and go to a state from which an event of people leads on.";
     DEPLOY_NO_REST = "deploy::no_rest", "something moves, and nothing is named that brings it to rest by force",
         "When a deployment is taken down by force (the third stage of stopping, docs/operating.md), its safe configurations are applied and then \
          everything is removed: what stands only by its drives falls. `shutdown: { rest: [park] }` names configurations that bring it to rest before \
@@ -857,6 +859,9 @@ codes! {
          of states (`--budget 500Kstates`) instead.";
     CLI_WHICH_COORDINATOR = "cli::which_coordinator", "it is not said which coordinator is meant",
         "The deployment has several coordinators (`coordinators:`), and the command works on one. Give its name with `--of NAME`.";
+    CLI_NO_FINDING = "cli::no_finding", "there is no finding of that number",
+        "`davit check FILE --trace N` shows the way to the N-th finding, counted from 1 in the order in which `davit check FILE` lists errors, \
+         warnings and notes.";
     CLI_UNKNOWN_SUBSYSTEM = "cli::unknown_subsystem", "there is no subsystem of that path",
         "`--in PATH` looks into one subsystem of a deployment. The path is made of the names under `subsystems:`, from the deployment \
          that is shown: `left`, or `cell/left` of one in a subsystem; a deployment without `subsystems:` has none. `davit status` and \

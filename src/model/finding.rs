@@ -140,6 +140,14 @@ impl Finding {
         self
     }
 
+    /// What was found, and what to do, in one line.
+    pub fn in_a_line(&self) -> String {
+        match &self.help {
+            Some(help) => format!("{}: {help}", self.message),
+            None => self.message.clone(),
+        }
+    }
+
     /// Whether it refuses.
     pub fn is_error(&self) -> bool {
         self.severity == Severity::Error

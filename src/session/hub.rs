@@ -279,6 +279,11 @@ impl Hub {
         self.note(Happening::Requested { request: Some(id.0), ask: ask.to_string(), by: by.to_owned() });
     }
 
+    /// Whether one of these is asked for, and not answered.
+    pub fn applies(&self, is: impl Fn(ConfigId) -> bool) -> bool {
+        self.lock().outstanding.values().any(|of| matches!(of.ask, Ask::Apply(id) if is(id)))
+    }
+
     /// A request was answered. It stays outstanding until it is [settled](Self::settled), when whoever asked has been told.
     pub fn answered(&self, answered: LoggedAnswer) {
         {

@@ -9,7 +9,6 @@ use crate::time::clock::panic_text;
 use serde::{Deserialize, Serialize};
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::time::Duration;
 
 /// How a deployment ended.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -88,8 +87,18 @@ impl Session {
             if !self.leads() {
                 break ("a coordinator has ended".to_owned(), false);
             }
-            if let Some(state) = self.failed_state() {
-                break (format!("the coordinator is in `{state}`"), false);
+            // Stopped in an emergency: what stopping it would move, nobody has asked for.
+            if let Some(state) = self.failed_state().filter(|_| !self.has_safe() || self.has_reacted()) {
+                match self.waits_for_people(start) {
+                    Ok(true) => {
+                        if !std::mem::replace(&mut told, true) {
+                            self.tell_held(&format!("it does not come up, since the coordinator is in `{state}`"));
+                        }
+                    }
+                    // It may be one: asked once more, before anything moves.
+                    Err(Unanswered) if !std::mem::replace(&mut unanswered, true) => continue,
+                    _ => break (format!("the coordinator is in `{state}`"), false),
+                }
             }
             if self.is_up() {
                 ticket.into_iter().for_each(|ticket| hub.forget(ticket));
@@ -105,17 +114,15 @@ impl Session {
                     continue;
                 }
             }
-            // Stopped in an emergency: what stopping it would move, nobody has asked for.
             let now = self.clock().now();
             if now >= deadline {
                 match self.waits_for_people(start) {
                     Ok(true) => {
                         deadline = now + bring_up.within;
                         if !std::mem::replace(&mut told, true) {
-                            self.tell_held(now.since(start));
+                            self.tell_held(&format!("not up after {} s", now.since(start).as_secs_f64().round()));
                         }
                     }
-                    // It may be one: asked once more, before anything moves.
                     Err(Unanswered) if !std::mem::replace(&mut unanswered, true) => deadline = now + bring_up.within,
                     _ => {}
                 }
@@ -146,11 +153,10 @@ impl Session {
     }
 
     /// It does not come up since something safe came, and nothing is stopped before people ask for it.
-    fn tell_held(&self, took: Duration) {
+    fn tell_held(&self, why: &str) {
         let note = format!(
-            "not up after {} s, and a safe configuration is in force: an event that its coordinator hears leads on (`davit status` says where it is), \
-             `davit shutdown` leads it down",
-            took.as_secs_f64().round()
+            "{why}, and a safe configuration is in force: an event that its coordinator hears leads on (`davit status` says where it is), \
+             `davit shutdown` leads it down"
         );
         self.hub().note(Happening::Noted { note });
     }

@@ -1,6 +1,6 @@
 //! What happened, in memory: a bounded number of entries, oldest dropped first.
 
-use super::halt::StoppingView;
+use super::halt::{StandsStill, StoppingView};
 use super::lanes::Lanes;
 use super::recovery::Difference;
 use super::stages::Stage;
@@ -329,6 +329,9 @@ pub struct StatusView {
     /// What stopping is at, once it has begun.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stopping: Option<StoppingView>,
+    /// Why it does not come up before people decide: something safe is in force.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stands_still: Option<StandsStill>,
     /// Events that found a coordinator's inbox, or its own queue, full, since the session began.
     pub dropped: Dropped,
     /// For how many seconds coordinators have been in one function, by name; those that have been for longer than

@@ -10,6 +10,7 @@ mod connection;
 mod consequences;
 mod doors;
 mod halt;
+mod held;
 mod hierarchy;
 pub mod hub;
 pub mod kept;

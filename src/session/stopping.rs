@@ -349,16 +349,8 @@ impl Session {
         told.notes.extend(notes);
     }
 
-    /// Whether a safe configuration is in force that came since then, and somebody is there to decide how to go on.
-    pub(super) fn waits_for_people(&self, began: Time) -> Result<bool, Unanswered> {
-        if !self.attended.load(Ordering::Relaxed) || !self.has_safe() {
-            return Ok(false);
-        }
-        Ok(self.frames()?.iter().any(|frame| frame.at >= began && self.is_safe(frame.configuration)))
-    }
-
     /// Whether something safe could be in force at all.
-    fn has_safe(&self) -> bool {
+    pub(super) fn has_safe(&self) -> bool {
         self.deployment().configurations.iter().any(|c| c.safe)
     }
 

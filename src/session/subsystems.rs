@@ -1,5 +1,6 @@
 //! The subsystems of a deployment that runs (semantics: *Composition*): who hears what, and what a parent is told without anybody writing it.
 
+use super::held::SafeOnes;
 use super::hub::Hub;
 use super::log::{Happening, Phase, SubsystemStatus};
 use super::routes::Junction;
@@ -43,11 +44,20 @@ struct SubsystemLife {
     /// When it has to be up, and down.
     up_until: Option<Time>,
     down_until: Option<Time>,
+    /// Since when that counts.
+    since: Time,
+    /// The one or the other is over, and nothing safe holds it.
+    is_late: bool,
     /// It was down with nothing left, and has asked for nothing since.
     empty: bool,
 }
 
 impl SubsystemLife {
+    /// When its time is over, if one runs.
+    fn until(&self) -> Option<Time> {
+        self.up_until.or(self.down_until)
+    }
+
     /// In one word: what was told last, but for one that is on its way.
     fn standing(&self) -> &'static str {
         match self.told {
@@ -85,6 +95,7 @@ pub(super) struct Subsystems {
     /// The paths of coordinators.
     of: FxHashMap<Requester, Ident>,
     lives: Mutex<Vec<SubsystemLife>>,
+    safe: SafeOnes,
     offered: Mutex<Vec<OfferedToSubsystem>>,
     clock: Clock,
     wake: Signal,
@@ -153,8 +164,9 @@ impl Subsystems {
                 .collect(),
         );
         let (clock, wake) = (clock.clone(), clock.signal());
-        let unheard = Mutex::default();
-        Self { all: known, paths, heard, unheard, safety, accepted, of, lives, offered: Mutex::default(), clock, wake }
+        let (unheard, offered) = (Mutex::default(), Mutex::default());
+        let safe = SafeOnes::new(deployment.configurations.iter().filter(|of| of.safe).map(|of| of.id));
+        Self { all: known, paths, heard, unheard, safety, accepted, of, lives, safe, offered, clock, wake }
     }
 
     /// Whether there is none.
@@ -239,9 +251,11 @@ impl Subsystems {
         match ends {
             false if heeded => {
                 (life.up_until, life.down_until, life.told) = (Some(now + known.up_within), None, None);
+                (life.since, life.is_late) = (now, false);
             }
             true if heeded || !is_down => {
                 (life.down_until, life.up_until) = (Some(now + known.down_within), None);
+                (life.since, life.is_late) = (now, false);
                 life.told.take_if(|_| is_down);
             }
             _ => return,
@@ -290,12 +304,10 @@ impl Subsystems {
         let told = {
             let mut lives = lock(&self.lives);
             let life = &mut lives[at];
-            let now = self.clock.now();
-            let over = |until: Option<Time>| until.is_some_and(|until| now >= until);
             let seen = SeenStanding {
                 down: seen.down && life.empty,
-                late: over(life.up_until),
-                stranded: over(life.down_until),
+                late: life.is_late && life.up_until.is_some(),
+                stranded: life.is_late && life.down_until.is_some(),
                 ..seen
             };
             let told = standing(life.told, seen);
@@ -388,9 +400,35 @@ impl Subsystems {
                 if junction.is_closed() {
                     return;
                 }
+                own.times_are_over(&hub, &junction);
                 (0..own.all.len()).for_each(|at| own.look_at(at, &hub, &junction));
             }
         });
+    }
+
+    /// Those are late whose time is over. Where something safe holds one that came since its time began, that begins anew: it waits for people.
+    fn times_are_over(&self, hub: &Hub, junction: &Junction) {
+        let now = self.clock.now();
+        let over = |life: &SubsystemLife| life.until().filter(|until| !life.is_late && *until <= now);
+        for (at, known) in self.all.iter().enumerate() {
+            let (until, since, within) = {
+                let life = &lock(&self.lives)[at];
+                let Some(until) = over(life) else { continue };
+                (until, life.since, if life.up_until.is_some() { known.up_within } else { known.down_within })
+            };
+            let configurator = lock(&junction.configurator).clone();
+            let held = configurator.is_some_and(|of| self.safe.hold(&self.clock, hub, &of, known.path, since));
+            let life = &mut lock(&self.lives)[at];
+            // It may have been begun, or ended, meanwhile.
+            if life.until() == Some(until) {
+                match held {
+                    true => {
+                        life.up_until.iter_mut().chain(&mut life.down_until).for_each(|until| *until = now + within)
+                    }
+                    false => life.is_late = true,
+                }
+            }
+        }
     }
 
     /// Ends that.
@@ -425,6 +463,8 @@ mod tests {
             told,
             up_until: up_until.map(Time),
             down_until: down_until.map(Time),
+            since: Time::default(),
+            is_late: false,
             empty: false,
         };
         let failed = Some(SubsystemStanding::Failed);

@@ -148,6 +148,13 @@ fn schema_writes_what_editors_need() {
         assert!(page.out.starts_with(&format!("# Reference: {kind}\n")), "{}", page.out);
     }
     assert_eq!(demo.run(&["schema"]).json()["properties"]["name"]["type"], "string");
+    // What this program has is completed, and what it has not underlined.
+    let deployment = demo.run(&["schema"]).json();
+    assert_eq!(deployment["properties"]["platform"]["anyOf"][0]["enum"], serde_json::json!(["embedded", "simulated"]));
+    assert_eq!(deployment["properties"]["libraries"]["anyOf"][0]["enum"], serde_json::json!(["standard", "youbot"]));
+    let types = &demo.run(&["schema", "configurations"]).json()["definitions"]["create"]["properties"]["type"];
+    let known = types["anyOf"][0]["enum"].as_array().unwrap();
+    assert!(known.contains(&"standard.Gain".into()), "{types}");
     assert_eq!(demo.run(&["schema", "lua", "-o", "davit.lua"]).code, 0);
     assert!(demo.read("davit.lua").contains("function property_set(property, value) end"));
     let unknown = demo.run(&["schema", "deploymnt"]);

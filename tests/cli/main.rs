@@ -1,5 +1,6 @@
 //! The command line as people and programs meet it: what is printed, in which shape, with which exit status.
 
+mod advised;
 mod agree;
 mod alternatives;
 mod answered;
@@ -17,6 +18,7 @@ mod demo;
 mod drawn;
 mod emergency;
 mod emergency_over;
+mod ended_below;
 mod endless;
 mod endurance;
 mod explored;

@@ -111,7 +111,7 @@ fn table(object: &Object, table: &Mapping) -> String {
                 }
             }
             ("state", "states", Value::Mapping(states)) => {
-                let Some(Form::Named(inner)) = form else { unreachable!() };
+                let Some(Form::Named(_, inner)) = form else { unreachable!() };
                 parts
                     .extend(states.iter().map(|(name, of)| format!("{} = {}", name.as_str().unwrap(), lua(inner, of))));
             }
@@ -138,10 +138,10 @@ fn table(object: &Object, table: &Mapping) -> String {
 fn lua(form: &Form, value: &Value) -> String {
     match (form, value) {
         (Form::Table(object), Value::Mapping(of)) => table(object, of),
-        (Form::List(inner) | Form::Several(inner), Value::Sequence(all)) => {
+        (Form::List(inner) | Form::Several(inner) | Form::Set(inner), Value::Sequence(all)) => {
             format!("{{ {} }}", all.iter().map(|one| lua(inner, one)).collect::<Vec<_>>().join(", "))
         }
-        (Form::Named(inner), Value::Mapping(of)) => {
+        (Form::Named(_, inner), Value::Mapping(of)) => {
             let entry = |(name, value): (&Value, &Value)| format!("[{}] = {}", plain(name), lua(inner, value));
             format!("{{ {} }}", of.iter().map(entry).collect::<Vec<_>>().join(", "))
         }

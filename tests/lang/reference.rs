@@ -3,8 +3,9 @@
 
 use davit::diagnostics::render;
 use davit::lang::grammar::{CHANGES, FILES, File, Form, Key, Languages, Object};
-use davit::lang::{self, LoadOptions, Loaded, Sources, schema};
-use davit::model::codes;
+use davit::lang::schema::{self, OptionName, PlatformNames, ProgramNames};
+use davit::lang::{self, LoadOptions, Loaded, Sources};
+use davit::model::{Ident, ValueType, codes};
 use serde_yaml::{Mapping, Value};
 use std::path::Path;
 
@@ -71,8 +72,10 @@ fn within(form: &Form, object: &Object, value: Value) -> Option<Value> {
     let named = |name: &str, value| Value::Mapping([(Value::from(name), value)].into_iter().collect());
     match form {
         Form::Table(other) => std::ptr::eq(*other, object).then_some(value),
-        Form::List(inner) | Form::Several(inner) => Some(Value::Sequence(vec![within(inner, object, value)?])),
-        Form::Named(inner) => Some(named("a", within(inner, object, value)?)),
+        Form::List(inner) | Form::Several(inner) | Form::Set(inner) => {
+            Some(Value::Sequence(vec![within(inner, object, value)?]))
+        }
+        Form::Named(_, inner) => Some(named("a", within(inner, object, value)?)),
         Form::Either(forms) => forms.iter().find_map(|form| within(form, object, value.clone())),
         Form::Changes => {
             let change = CHANGES.iter().find(|change| std::ptr::eq(change.object, object))?;
@@ -290,6 +293,41 @@ fn the_schema_demands_one_of_two_keys() {
     assert!(!valid(&text.replace("libraries: [standard]\n", "")));
 }
 
+/// The schema of a program has its platforms with their options, and its libraries.
+#[test]
+fn the_schema_has_the_names_of_its_program() {
+    let option = |name: &str, ty, required| OptionName { name: ident(name), ty, required, doc: "it".to_owned() };
+    let bus = vec![option("device", ValueType::Str, true), option("rate", ValueType::Float, false)];
+    let platforms =
+        [("bus", bus), ("embedded", Vec::new())].map(|(name, options)| PlatformNames { name: ident(name), options });
+    let names = ProgramNames { platforms: platforms.into(), libraries: vec![ident("standard")], types: Vec::new() };
+    let file = File::named("deployment").unwrap();
+    let validator = jsonschema::validator_for(&schema::json_schema(file, &names)).unwrap();
+    for (line, right) in [
+        ("platform: embedded", true),
+        ("platform: embeded", false),
+        ("platform: { embedded: }", true),
+        ("platform: { embedded: {}, bus: { device: can0 } }", false),
+        ("platform: { embedded: { device: can0 } }", false),
+        ("platform: { bus: { device: can0 } }", true),
+        ("platform: { bus: { device: can0, rate: 1 } }", true),
+        ("platform: { bus: { device: can0, rate: fast } }", false),
+        ("platform: { bus: { rate: 1.0 } }", false),
+        ("platform: { bus: { device: can0, rat: 1.0 } }", false),
+        ("platform: { bus: }", false),
+        ("libraries: standard", true),
+        ("libraries: [standart]", false),
+    ] {
+        let mut table = least(file.object);
+        put(&mut table, line);
+        assert_eq!(validator.is_valid(&as_json(&Value::Mapping(table))), right, "{line}");
+    }
+}
+
+fn ident(name: &str) -> Ident {
+    Ident::new(name).unwrap()
+}
+
 /// What no schema sees: files, numbers that are none, and what stands in several places.
 const BEYOND: &[davit::model::Code] = &[
     codes::TEXT_NO_FILE,
@@ -300,7 +338,8 @@ const BEYOND: &[davit::model::Code] = &[
 ];
 
 fn validator(file: &File) -> jsonschema::Validator {
-    jsonschema::validator_for(&schema::json_schema(file)).unwrap_or_else(|why| panic!("{}: {why}", file.name))
+    jsonschema::validator_for(&schema::json_schema(file, &ProgramNames::default()))
+        .unwrap_or_else(|why| panic!("{}: {why}", file.name))
 }
 
 fn as_json(value: &Value) -> serde_json::Value {
@@ -327,6 +366,69 @@ fn the_schema_says_what_reading_says() {
             }
         }
     }
+}
+
+/// Each row with the value of its example.
+fn examples() -> impl Iterator<Item = (&'static File, &'static Object, &'static Key, Value)> {
+    let with_example = |(file, object, key, ..): (&'static File, &'static Object, &'static Key, Value, Value)| {
+        let example = yaml(&key.yaml()).as_mapping().and_then(|table| table.get(key.name)).cloned();
+        (key.language != Languages::None).then(|| (file, object, key, example.expect("the key's own example")))
+    };
+    rows().into_iter().filter_map(with_example)
+}
+
+/// The whole file in which a row has that value, and whether reading takes it.
+fn is_read(file: &'static File, object: &'static Object, key: &Key, value: Value) -> (Value, bool) {
+    let mut table = least(object);
+    put(&mut table, key.beside);
+    table.insert(Value::from(key.name), value);
+    let whole = around(file, object, table);
+    let loaded = load(file, &serde_yaml::to_string(&whole).unwrap(), "x.yaml");
+    (whole, !refused(&loaded))
+}
+
+/// What is a list in which each stands once is one to both, and what is not is one to neither.
+#[test]
+fn the_schema_and_reading_agree_about_what_stands_twice() {
+    let mut tried = (0, 0);
+    for (file, object, key, example) in examples() {
+        let (Form::List(inner) | Form::Several(inner) | Form::Set(inner)) = key.form else { continue };
+        // Two transitions that are the same are another mistake.
+        if matches!(inner, Form::Table(_)) {
+            continue;
+        }
+        let one = example.as_sequence().and_then(|list| list.first()).unwrap_or(&example).clone();
+        let (whole, read) = is_read(file, object, key, Value::Sequence(vec![one.clone(), one]));
+        let what = format!("{}.{}", object.name, key.name);
+        let once = matches!(key.form, Form::Set(_));
+        *(if once { &mut tried.0 } else { &mut tried.1 }) += 1;
+        assert_eq!(read, !once, "{what}: reading\n{}", serde_yaml::to_string(&whole).unwrap());
+        assert_eq!(validator(file).is_valid(&as_json(&whole)), !once, "{what}: the schema");
+    }
+    assert!(tried.0 > 12 && tried.1 > 4, "{tried:?}");
+}
+
+/// What a table's own entries may be called is the same to both.
+#[test]
+fn the_schema_and_reading_agree_about_names() {
+    let mut tried = 0;
+    for (file, object, key, example) in examples() {
+        let is_named = |form: &Form| matches!(form, Form::Named(..));
+        let named = is_named(&key.form) || matches!(key.form, Form::Either(forms) if forms.iter().any(is_named));
+        let Some((_, value)) = example.as_mapping().filter(|_| named).and_then(|table| table.iter().next()) else {
+            continue;
+        };
+        for (name, right) in [("ne-ar", false), ("9th", false), ("", false), ("a b", false), ("near", true)] {
+            let table = Value::Mapping([(Value::from(name), value.clone())].into_iter().collect());
+            let (whole, read) = is_read(file, object, key, table);
+            let what = format!("{}.{}: `{name}`", object.name, key.name);
+            // A name that is right may still be one that nothing has.
+            assert!(right || !read, "{what}: reading");
+            assert_eq!(validator(file).is_valid(&as_json(&whole)), right, "{what}: the schema");
+        }
+        tried += 1;
+    }
+    assert!(tried > 14, "{tried}");
 }
 
 /// An editor underlines a slip however deep it stands in a condition.

@@ -6,6 +6,7 @@ mod bringup;
 mod classes;
 mod defects;
 mod doors;
+mod failed_held;
 mod flood;
 mod given_on;
 mod hangs;

@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Each with what is set for it here: what takes a minute in the file is shorter.
-const SCENARIOS: [(&str, &[(&str, &str)]); 38] = [
+const SCENARIOS: [(&str, &[(&str, &str)]); 40] = [
     ("beside", &[]),
     ("blocked", &[]),
     ("bring_up", &[]),
@@ -28,6 +28,7 @@ const SCENARIOS: [(&str, &[(&str, &str)]); 38] = [
     ("link", &[]),
     ("modes", &[]),
     ("modes_in_motion", &[]),
+    ("never_returns", &[]),
     ("one_stops", &[]),
     ("one_way", &[]),
     ("parked_in_contact", &[]),
@@ -37,6 +38,7 @@ const SCENARIOS: [(&str, &[(&str, &str)]); 38] = [
     ("push", &[]),
     ("push_on", &[]),
     ("refused", &[]),
+    ("rejected", &[]),
     ("repair", &[]),
     ("saturated", &[]),
     ("shutdown_while_copying", &[]),

@@ -46,8 +46,9 @@ pub(super) fn deploy(host: &SharedHost, file: &str, options: Option<Table>) -> m
             host.borrow_mut().unread = Some(unread.clone());
             return error(unread);
         }
+        let told = IsRefused::of(file, &refused);
         host.borrow_mut().refused = Some((path.clone(), Box::new(refused)));
-        mlua::Error::external(IsRefused(file.to_owned()))
+        mlua::Error::external(told)
     })?;
     let clock = clock(host);
     host.borrow().faults.fit(&checked)?;

@@ -12,7 +12,7 @@ pub enum ScriptFailure {
     #[error("{}", .0.message)]
     Unreadable(Box<Finding>),
     /// It uses names that there are not. It was not begun.
-    #[error("{}", told(findings))]
+    #[error("{}", findings.iter().map(Finding::in_a_line).collect::<Vec<_>>().join("; "))]
     Unknown {
         /// Each with its place.
         findings: Vec<Finding>,
@@ -49,16 +49,26 @@ pub enum ScriptFailure {
     },
 }
 
-/// What `deploy` raises.
-#[derive(Debug, thiserror::Error)]
-#[error("{0} is refused")]
-pub(super) struct IsRefused(pub String);
+/// How many reasons are told to a script that catches a refusal.
+const REASONS: usize = 8;
 
-/// Findings in one line, each with what to do.
-fn told(findings: &[Finding]) -> String {
-    let one = |finding: &Finding| match &finding.help {
-        Some(help) => format!("{}: {help}", finding.message),
-        None => finding.message.clone(),
-    };
-    findings.iter().map(one).collect::<Vec<_>>().join("; ")
+/// What `deploy` raises: who catches it is told why.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub(super) struct IsRefused(String);
+
+impl IsRefused {
+    /// That a deployment is, and why: a line for each error, with its place.
+    pub fn of(file: &str, refused: &Refused) -> Self {
+        let errors = || refused.findings.iter().filter(|finding| finding.is_error());
+        let placed = |finding: &Finding| {
+            let place = refused.sources.locate(finding.origin);
+            let place = place.map(|at| format!("{}:{}: ", refused.sources.file(at.file).name, at.line));
+            format!("\n  {}{}", place.unwrap_or_default(), finding.in_a_line())
+        };
+        let told: String = errors().take(REASONS).map(placed).collect();
+        let more = errors().count().saturating_sub(REASONS);
+        let more = if more > 0 { format!("\n  and {more} more") } else { String::new() };
+        Self(format!("{file} is refused{told}{more}"))
+    }
 }

@@ -142,9 +142,6 @@ fn fits(fault: &StepFault, checked: &Checked) -> mlua::Result<()> {
     }
     match check::fault(fault, deployment, &checked.catalogue).into_iter().next() {
         None => Ok(()),
-        Some(finding) => {
-            let help = finding.help.map(|help| format!(": {help}")).unwrap_or_default();
-            Err(error(format!("fault \"{step}\": {}{help}", finding.message)))
-        }
+        Some(finding) => Err(error(format!("fault \"{step}\": {}", finding.in_a_line()))),
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{SharedHost, error};
 use crate::model::Ident;
-use crate::model::finding::did_you_mean;
+use crate::model::finding::{did_you_mean, nearest};
 use mlua::{Lua, Value};
 
 /// What was given to a script, and which of it the script has read.
@@ -10,7 +10,7 @@ use mlua::{Lua, Value};
 pub(super) struct ScriptParameters {
     given: Vec<(String, String)>,
     read: Vec<String>,
-    /// Those of them that the script's text reads somewhere: they are its own, also where it comes to that behind `deploy`.
+    /// Those that the script's text reads somewhere: they are its own, also where it comes to that behind `deploy`.
     own: Vec<String>,
     /// Somebody else may have read the rest: a deployment that was loaded with it.
     handed_on: bool,
@@ -18,8 +18,7 @@ pub(super) struct ScriptParameters {
 
 impl ScriptParameters {
     pub(super) fn new(given: &[(String, String)], text: &str) -> Self {
-        let own = given.iter().map(|(name, _)| name).filter(|name| reads(text, name)).cloned().collect();
-        Self { given: given.to_vec(), own, ..Self::default() }
+        Self { given: given.to_vec(), own: own(text), ..Self::default() }
     }
 
     /// What the script has not read, and a deployment may.
@@ -30,7 +29,8 @@ impl ScriptParameters {
 
     /// What to say of one that nobody reads.
     pub(super) fn unread(&self, name: &str) -> String {
-        let help = did_you_mean(name, "parameters of the script", self.read.iter().map(String::as_str));
+        let read = self.read.iter().filter(|read| !self.own.contains(read));
+        let help = did_you_mean(name, "parameters of the script", self.own.iter().chain(read).map(String::as_str));
         format!("nothing reads the parameter `{name}`: {help}")
     }
 
@@ -48,25 +48,34 @@ impl ScriptParameters {
             .findings
             .iter()
             .any(|finding| finding.code == TEXT_UNKNOWN_PARAMETER && finding.severity == crate::model::Severity::Error);
-        let ours = self.given.iter().find(|(name, _)| {
+        let ours = self.given.iter().filter(|(name, _)| !self.read.contains(name)).find_map(|(name, _)| {
             let named = format!("`{}`", name.split('.').next().unwrap_or(name));
-            let here = |finding: &crate::model::Finding| {
+            let here = |finding: &&crate::model::Finding| {
                 finding.code == TEXT_UNKNOWN_PARAMETER && finding.message.contains(&named)
             };
-            !self.read.contains(name) && refused.findings.iter().any(here)
+            Some((name, refused.findings.iter().find(here)?))
         });
-        ours.filter(|_| unknown).map(|(name, _)| self.unread(name))
+        let (name, told) = ours.filter(|_| unknown)?;
+        // Of the script's and those of the deployment a near one is meant.
+        let is_near = |help: &str| help.starts_with("did you mean");
+        let theirs =
+            told.help.as_deref().is_some_and(is_near) && nearest(name, self.own.iter().map(String::as_str)).is_none();
+        Some(if theirs { told.in_a_line() } else { self.unread(name) })
     }
 }
 
-/// Whether a script's text has `param("NAME"` in it, however it is spelt.
-fn reads(text: &str, name: &str) -> bool {
-    text.match_indices("param").any(|(at, word)| {
+/// The names in each `param("NAME"` of a script's text, however that is spelt.
+fn own(text: &str) -> Vec<String> {
+    let named = text.match_indices("param").filter_map(|(at, word)| {
         let behind = text[at + word.len()..].trim_start();
         let behind = behind.strip_prefix('(').unwrap_or(behind).trim_start();
-        let quoted = |quote: char| behind.strip_prefix(quote).and_then(|behind| behind.strip_prefix(name));
-        ['"', '\''].into_iter().any(|quote| quoted(quote).is_some_and(|behind| behind.starts_with(quote)))
-    })
+        let quote = behind.chars().next().filter(|c| ['"', '\''].contains(c))?;
+        behind[1..].split_once(quote).map(|(name, _)| name.to_owned())
+    });
+    let mut names: Vec<String> = named.filter(|name| Ident::new(name).is_ok()).collect();
+    names.sort_unstable();
+    names.dedup();
+    names
 }
 
 pub(super) fn param(host: &SharedHost, lua: &Lua, name: &str, default: Value) -> mlua::Result<Value> {

@@ -18,12 +18,3 @@ pub fn state() -> Result<(Lua, Guards)> {
     let guards = functions::guard(&lua, &lua.create_table()?, limits::SCRIPT_MEMORY, limits::SCRIPT_TIME)?;
     Ok((lua, guards))
 }
-
-/// The text without a first line `#!…`, which the shell reads and Lua does not; its line stays, for the numbers.
-pub fn without_hash_bang(text: &[u8]) -> &[u8] {
-    if !text.starts_with(b"#") {
-        return text;
-    }
-    let end = text.iter().position(|b| *b == b'\n').unwrap_or(text.len());
-    &text[end..]
-}

@@ -170,13 +170,14 @@ fn value_type(cx: &mut Cx, node: Node) -> Option<ValueType> {
             Err(_) => {
                 let origin = node.origin;
                 let words = ["bool", "int", "float", "string", "event"];
-                let near = crate::model::finding::nearest(&text, words);
+                let (word, lengths) = text.split_at(text.find('[').unwrap_or(text.len()));
+                let near = crate::model::finding::nearest(word.trim(), words);
                 let help = near.map_or_else(
                     || {
                         "types are bool, int, float, string, event, \"float[3]\", \"float[]\", {x: float, y: float}"
                             .to_owned()
                     },
-                    |near| format!("did you mean `{near}`?"),
+                    |near| format!("did you mean `{near}{lengths}`?"),
                 );
                 cx.report(
                     Finding::error(codes::TYPE_BAD_TYPE, format!("`{text}` is not a type")).at(origin).help(help),

@@ -36,7 +36,7 @@ pub static STATE: Object = Object {
     keys: &[
         key(
             "states",
-            Form::Named(&Form::Either(&[Form::Table(&STATE), Form::Table(&CONNECTOR)])),
+            Form::Named(NameKind::Plain, &Form::Either(&[Form::Table(&STATE), Form::Table(&CONNECTOR)])),
             "The states in it.",
             "states: { idle: {}, busy: {} }",
             ("states: [idle, busy]", TEXT_WRONG_TYPE),
@@ -52,7 +52,7 @@ pub static STATE: Object = Object {
         .only(Languages::Yaml),
         key(
             "config",
-            Form::Several(&Form::Name(NameKind::Configuration)),
+            Form::Set(&Form::Name(NameKind::Configuration)),
             "Configurations that are in force while it is active: entering it asks for them, leaving it takes them back.",
             "config = \"enable_copying\"",
             ("config: \"enable copying\"", TEXT_BAD_NAME),

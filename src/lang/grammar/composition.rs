@@ -38,7 +38,7 @@ pub static PARAMETER: Object = Object {
     ..Object::BARE
 };
 
-const MEMBERS: Form = Form::Named(&Form::Name(NameKind::Member));
+const MEMBERS: Form = Form::Named(NameKind::Plain, &Form::Name(NameKind::Member));
 
 /// The exports of a deployment.
 pub static EXPORTS: Object = Object {
@@ -129,14 +129,14 @@ pub static SUBSYSTEM: Object = Object {
         .required(),
         key(
             "parameters",
-            Form::Named(&Form::Value),
+            Form::Named(NameKind::Plain, &Form::Value),
             "Values of its parameters; `{ parameter: NAME }` for one gives it what this file's own parameter of that name is worth.",
             "parameters: { delay_s: 0.02 }",
             ("parameters: 0.02", TEXT_WRONG_TYPE),
         ).without("their defaults"),
         key(
             "activities",
-            Form::Named(&Form::Name(NameKind::Plain)),
+            Form::Named(NameKind::Plain, &Form::Name(NameKind::Plain)),
             "Activities of it that are those of this file: its name for one, and the name here. All others are its own.",
             "activities: { control: control }",
             ("activities: [control]", TEXT_WRONG_TYPE),

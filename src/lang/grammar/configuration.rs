@@ -14,7 +14,7 @@ pub static CONFIGURATIONS_FILE: Object = Object {
     example: "configurations: { engage: { changes: [{ property_set: { property: A.k, value: 1.0 } }] } }",
     keys: &[key(
         "configurations",
-        Form::Named(&Form::Table(&CONFIGURATION)),
+        Form::Named(NameKind::Configuration, &Form::Table(&CONFIGURATION)),
         "The configurations.",
         "configurations: { engage: { changes: [{ property_set: { property: A.k, value: 1.0 } }] } }",
         ("configuratons: {}", TEXT_UNKNOWN_KEY),
@@ -184,7 +184,7 @@ const COMPONENT_TYPE: Key =
 
 const PROPERTIES: Key = key(
     "properties",
-    Form::Named(&Form::Value),
+    Form::Named(NameKind::Plain, &Form::Value),
     "Initial values of properties; in Lua in the table behind the type. `tunable` does not bind them.",
     "properties = { friction_comp = 0.9 }",
     ("properties: [0.9]", TEXT_WRONG_TYPE),
@@ -258,7 +258,7 @@ static REPLACE: Object = Object {
         PROPERTIES,
         key(
             "map",
-            Form::Named(&Form::Name(NameKind::Plain)),
+            Form::Named(NameKind::Plain, &Form::Name(NameKind::Plain)),
             "Ports of the old one, and what they are called on the new one; in Lua in the table behind the type. A connected port that \
              the new one does not have must stand here.",
             "map = { force = \"wrench\" }",

@@ -7,8 +7,8 @@ use crate::model::codes::{
     DEPLOY_NO_JOURNAL, TEXT_BAD_NAME, TEXT_BAD_TIME, TEXT_BAD_VALUE, TEXT_DUPLICATE_KEY, TEXT_NO_FILE, TEXT_WRONG_TYPE,
 };
 
-const FILES: Form = Form::Several(&Form::Path);
-pub(super) const EVENTS: Form = Form::Several(&Form::Name(NameKind::Event));
+const FILES: Form = Form::Set(&Form::Path);
+pub(super) const EVENTS: Form = Form::Set(&Form::Name(NameKind::Event));
 
 /// Fewest frames a deployment may ask for: the newest, and the one that all others are squashed into.
 const FEWEST_FRAMES: i64 = 2;
@@ -33,7 +33,10 @@ pub static DEPLOYMENT: Object = Object {
         .required(),
         key(
             "platform",
-            Form::Either(&[Form::Name(NameKind::Plain), Form::Named(&Form::Named(&Form::Value))]),
+            Form::Either(&[
+                Form::Name(NameKind::Platform),
+                Form::Named(NameKind::Platform, &Form::Named(NameKind::Plain, &Form::Value)),
+            ]),
             "Where its components live: `embedded` runs them in this process, `simulated` only keeps books of them and \
              injects the faults that are asked for; a program may bring others. Options of a platform stand under its name: \
              `platform: { bus: { device: \"can0\" } }`.",
@@ -43,7 +46,7 @@ pub static DEPLOYMENT: Object = Object {
         .required(),
         key(
             "libraries",
-            Form::Several(&Form::Name(NameKind::Plain)),
+            Form::Set(&Form::Name(NameKind::Library)),
             "Libraries of component types, by name; `davit types` lists what they offer.",
             "libraries: [standard]",
             ("libraries: [\"my lib\"]", TEXT_BAD_NAME),
@@ -51,7 +54,7 @@ pub static DEPLOYMENT: Object = Object {
         .instead("types"),
         key(
             "types",
-            Form::Named(&Form::Table(&TYPE)),
+            Form::Named(NameKind::Type, &Form::Table(&TYPE)),
             "Component types that are declared here. The simulated platform runs any; on another one a library must bring the \
              component. Where a library of the deployment has a type of that name, that is what counts, and `davit check` tells every \
              difference.",
@@ -60,7 +63,7 @@ pub static DEPLOYMENT: Object = Object {
         ).without("there are those of `libraries`"),
         key(
             "activities",
-            Form::Named(&Form::Table(&ACTIVITY)),
+            Form::Named(NameKind::Plain, &Form::Table(&ACTIVITY)),
             "Threads in which components are updated; `create` names the one of its component.",
             "activities: { control: { period_ms: 1.0, priority: 80 } }",
             ("activities: [control]", TEXT_WRONG_TYPE),
@@ -83,7 +86,7 @@ pub static DEPLOYMENT: Object = Object {
         .instead("coordinators"),
         key(
             "coordinators",
-            Form::Named(&Form::Path),
+            Form::Named(NameKind::Plain, &Form::Path),
             "Several coordinators that run side by side, each under its name.",
             "coordinators: { arm: arm.lua, gripper: gripper.lua }",
             ("coordinators: [arm.lua]", TEXT_WRONG_TYPE),
@@ -113,7 +116,7 @@ pub static DEPLOYMENT: Object = Object {
         .beside("trusted: true"),
         key(
             "with",
-            Form::Named(&Form::Value),
+            Form::Named(NameKind::Plain, &Form::Value),
             "Parameters of the Lua files, where each is a global of that name; `--set gain=0.7` overrides it, and one of these that no file reads is refused (here that is a warning).",
             "with: { gain: 0.5 }",
             ("with: 0.5", TEXT_WRONG_TYPE),
@@ -134,7 +137,7 @@ pub static DEPLOYMENT: Object = Object {
         ).without("those two alone"),
         key(
     "parameters",
-    Form::Named(&Form::Table(&PARAMETER)),
+    Form::Named(NameKind::Plain, &Form::Table(&PARAMETER)),
     "What the deployment can be given, by the deployment that it is a subsystem of or by `--set`; each is a global of its Lua files. \
      One without a default must be given, and one that no file reads is told.",
     "parameters: { gain: { type: float, default: 0.5, min: 0.0 } }",
@@ -158,7 +161,7 @@ pub static DEPLOYMENT: Object = Object {
 .beside("accepts: [e_released]\nemits: [e_leaving]"),
         key(
     "subsystems",
-    Form::Named(&Form::Table(&SUBSYSTEM)),
+    Form::Named(NameKind::Plain, &Form::Table(&SUBSYSTEM)),
     "Other deployments as parts of this one, each under a name; one file may be used many times. Names of what is in one have its \
      name before them: `left/Dynamics`, `left/e_start`.",
     "subsystems: { left: { deployment: robot.yaml } }",
@@ -174,7 +177,7 @@ pub static DEPLOYMENT: Object = Object {
         ).without("none"),
         key(
             "operator",
-            Form::Several(&Form::Either(&[Form::Name(NameKind::Configuration), Form::Name(NameKind::Member)])),
+            Form::Set(&Form::Either(&[Form::Name(NameKind::Configuration), Form::Name(NameKind::Member)])),
             "What an operator may do while it is up: configurations to be applied, and properties and in-ports to be set \
              (`Component.member`). `davit check` follows them wherever they may come.",
             "operator: [profile_soft, Cart_Impedance.stiffness]",
@@ -292,7 +295,7 @@ pub static DEPLOY: Object = Object {
         .required(),
         key(
             "up",
-            Form::Several(&Form::State),
+            Form::Set(&Form::State),
             "The state that means *up*; of several coordinators one each.",
             "up: operational",
             ("up: opera-tional", TEXT_BAD_NAME),
@@ -335,7 +338,7 @@ pub static SHUTDOWN: Object = Object {
         .required(),
         key(
             "down",
-            Form::Several(&Form::State),
+            Form::Set(&Form::State),
             "The state that means *down*; of several coordinators one each.",
             "down: idle",
             ("down: \"id le\"", TEXT_BAD_NAME),
@@ -351,7 +354,7 @@ pub static SHUTDOWN: Object = Object {
         .required(),
         key(
             "rest",
-            Form::Several(&Form::Name(NameKind::Configuration)),
+            Form::Set(&Form::Name(NameKind::Configuration)),
             "Configurations that bring the hardware to rest, in this order, where it is taken down without its coordinators.",
             "rest: [park]",
             ("rest: [\"p ark\"]", TEXT_BAD_NAME),

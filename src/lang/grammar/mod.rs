@@ -143,8 +143,10 @@ pub enum Form {
     List(&'static Form),
     /// One of these, or a list of them.
     Several(&'static Form),
+    /// One of these, or a list of them in which each stands once.
+    Set(&'static Form),
     /// These, each under a name of its own.
-    Named(&'static Form),
+    Named(NameKind, &'static Form),
     /// A table.
     Table(&'static Object),
     /// Any one of these.
@@ -158,6 +160,10 @@ pub enum NameKind {
     Plain,
     /// A deployment: a plain name that is short enough for a file at which it is reached.
     Deployment,
+    /// A platform.
+    Platform,
+    /// A library of component types.
+    Library,
     /// A component.
     Component,
     /// A component type.
@@ -176,6 +182,8 @@ impl NameKind {
         match self {
             Self::Plain => "a name (letters, digits and `_`, no digit first)",
             Self::Deployment => "a name (letters, digits and `_`, no digit first; at most 64 letters)",
+            Self::Platform => "the name of a platform",
+            Self::Library => "the name of a library",
             Self::Component => "the name of a component",
             Self::Type => "the name of a component type",
             Self::Configuration => "the name of a configuration",
@@ -187,7 +195,7 @@ impl NameKind {
     /// Its grammar as a regular expression.
     pub fn pattern(self) -> &'static str {
         match self {
-            Self::Plain => "^[A-Za-z_][A-Za-z0-9_]*$",
+            Self::Plain | Self::Platform | Self::Library => "^[A-Za-z_][A-Za-z0-9_]*$",
             Self::Deployment => "^[A-Za-z_][A-Za-z0-9_]{0,63}$",
             Self::Component | Self::Configuration => "^[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*$",
             Self::Type => "^([A-Za-z_][A-Za-z0-9_]*/)*[A-Za-z_][A-Za-z0-9_]*(\\.[A-Za-z_][A-Za-z0-9_]*)*$",
@@ -358,7 +366,8 @@ impl Form {
             }
             Self::List(form) => format!("a list; each: {}", form.words(links)),
             Self::Several(form) => format!("{}; or a list of such", form.words(links)),
-            Self::Named(form) => format!("by name; each: {}", form.words(links)),
+            Self::Set(form) => format!("{}; or a list of such, each once", form.words(links)),
+            Self::Named(_, form) => format!("by name; each: {}", form.words(links)),
             Self::Table(object) if links == Words::Linked => format!("a table: [{0}](#table-{0})", object.name),
             Self::Table(object) => format!("a table: {}", object.name),
             Self::Either(forms) => forms.iter().map(|form| form.words(links)).collect::<Vec<_>>().join("; or "),
@@ -369,7 +378,7 @@ impl Form {
     pub fn tables(&self, each: &mut dyn FnMut(&'static Object)) {
         match self {
             Self::Table(object) => each(object),
-            Self::List(form) | Self::Several(form) | Self::Named(form) => form.tables(each),
+            Self::List(form) | Self::Several(form) | Self::Set(form) | Self::Named(_, form) => form.tables(each),
             Self::Either(forms) => forms.iter().for_each(|form| form.tables(each)),
             Self::Changes => CHANGES.iter().for_each(|change| each(change.object)),
             Self::Condition => each(&COMPARISON),

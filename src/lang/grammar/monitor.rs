@@ -13,7 +13,7 @@ pub static MONITORS_FILE: Object = Object {
     example: "monitors: { high: { when: { above: [A.x, 2.0] }, event: e_high } }",
     keys: &[key(
         "monitors",
-        Form::Named(&Form::Table(&MONITOR)),
+        Form::Named(NameKind::Plain, &Form::Table(&MONITOR)),
         "The monitors.",
         "monitors: { high: { when: { above: [A.x, 2.0] }, event: e_high } }",
         ("monitrs: {}", TEXT_UNKNOWN_KEY),

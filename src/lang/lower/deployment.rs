@@ -101,7 +101,7 @@ fn note_keys(entries: &[Entry], prefix: &str, out: &mut BTreeMap<String, Origin>
 /// Notes where a type lists something: what its members are has places of its own.
 fn note_lists(ty: &Entry, out: &mut BTreeMap<String, Origin>) {
     let Kind::Map(keys) = &ty.value.kind else { return };
-    let is_list = |entry: &&Entry| matches!(TYPE.key(&entry.key), Some(key) if matches!(key.form, Form::Several(_)));
+    let is_list = |entry: &&Entry| matches!(TYPE.key(&entry.key), Some(key) if matches!(key.form, Form::Several(_) | Form::Set(_)));
     for entry in keys.iter().filter(is_list) {
         note_keys(std::slice::from_ref(entry), &format!("types.{}", ty.key), out);
     }

@@ -94,7 +94,7 @@ impl Fields {
 fn words_of(form: &Form) -> &'static [&'static str] {
     match form {
         Form::Choice(words) => words,
-        Form::Several(form) | Form::List(form) => words_of(form),
+        Form::Several(form) | Form::Set(form) | Form::List(form) => words_of(form),
         Form::Either(forms) => forms.iter().map(words_of).find(|words| !words.is_empty()).unwrap_or_default(),
         _ => &[],
     }

@@ -16,6 +16,7 @@ use super::files::Sources;
 use super::params::Params;
 use super::tokens::{KeyAgain, Token, keys_again, tokens};
 use super::tree::{Cx, Entry, Kind, Node, Reading, stands_twice};
+use crate::functions::without_hash_bang;
 use crate::limits;
 use crate::model::{Finding, codes};
 use mlua::chunk::ChunkMode;
@@ -112,12 +113,7 @@ fn run(shared: &SharedRecorder, text: &str) -> mlua::Result<Option<Node>> {
 
 /// A text as a function of Lua.
 fn chunk(lua: &mlua::Lua, shared: &SharedRecorder, text: &str, env: mlua::Table) -> mlua::Result<mlua::Function> {
-    // A first line `#!…` is blanked and not cut: lines keep their numbers.
-    let text = if text.starts_with('#') {
-        text.split_once('\n').map_or("", |_| &text[text.find('\n').unwrap_or(0)..])
-    } else {
-        text
-    };
+    let text = without_hash_bang(text);
     let chunk = lua.load(text).set_name("=davit").set_mode(ChunkMode::Text).set_environment(env);
     // Not `eval`, which tries the text as an expression first: a file never is one.
     let before = std::mem::replace(&mut shared.borrow_mut().parsing, true);

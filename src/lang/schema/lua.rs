@@ -156,8 +156,8 @@ fn kind(form: &Form) -> String {
         Form::Function => "function".to_owned(),
         Form::Changes => "davit.Change[]".to_owned(),
         Form::List(inner) => list(inner),
-        Form::Several(inner) => format!("{}|{}", kind(inner), list(inner)),
-        Form::Named(inner) => format!("table<string, {}>", kind(inner)),
+        Form::Several(inner) | Form::Set(inner) => format!("{}|{}", kind(inner), list(inner)),
+        Form::Named(_, inner) => format!("table<string, {}>", kind(inner)),
         Form::Table(object) => format!("davit.{}", class_name(object)),
         Form::Either(forms) => forms.iter().map(kind).collect::<Vec<_>>().join("|"),
     }

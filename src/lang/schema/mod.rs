@@ -5,6 +5,6 @@ mod json;
 mod lua;
 mod reference;
 
-pub use json::json_schema;
+pub use json::{OptionName, PlatformNames, ProgramNames, json_schema};
 pub use lua::annotations;
 pub use reference::{Example, ReferenceEntry, about, keys_of, markdown, names};

@@ -1,0 +1,175 @@
+//! An emergency of a subsystem, or of another coordinator, that ends since its parent goes on by itself: `check` says so, and what it advises
+//! keeps it until people ask.
+
+use crate::demo::Demo;
+use serde_json::Value as Json;
+
+const HALL: &str = "davit: 1
+name: hall
+platform: simulated
+types: { Lamp: {} }
+subsystems: { belt: { deployment: conveyor.yaml } }
+configurations: hall_configurations.yaml
+coordinator: hall_coordinator.yaml
+safety: e_stop
+deploy:   { event: e_open,  up: open, failed: failed, within_s: 5 }
+shutdown: { event: e_close, down: shut, within_s: 5 }
+faults: [{ step: stop Lamp, how: slow, takes_s: 0.5 }]
+";
+const HALL_CONFIGURATIONS: &str = "configurations:
+  lamp: { changes: [{ create: { component: Lamp, type: Lamp } }] }
+  light: { post_conf_state: [\"Lamp:running\"] }
+";
+/// Takes its light back, and ends the conveyor when that is done.
+const HALL_COORDINATOR: &str = "coordinator:
+  states:
+    shut: {}
+    making: { entry: lamp }
+    lighting: { entry: light }
+    waiting: {}
+    open: {}
+    failed: {}
+    dimming: { entry: light.undo }
+    ending: { entry: belt/e_end }
+    removing: { entry: lamp.undo }
+  transitions:
+    - { src: initial, tgt: shut }
+    - { src: shut, tgt: making, events: e_open }
+    - { src: making, tgt: lighting, events: lamp.ok }
+    - { src: lighting, tgt: waiting, events: light.ok, effect: belt/e_start }
+    - { src: waiting, tgt: open, events: belt/up }
+    - { src: waiting, tgt: failed, events: belt/failed }
+    - { src: making, tgt: failed, events: [lamp.failed, lamp.broken] }
+    - { src: lighting, tgt: failed, events: [light.failed, light.broken] }
+    - { src: making, tgt: dimming, events: e_close }
+    - { src: lighting, tgt: dimming, events: e_close }
+    - { src: waiting, tgt: dimming, events: e_close }
+    - { src: open, tgt: dimming, events: e_close }
+    - { src: failed, tgt: dimming, events: e_close }
+    - { src: dimming, tgt: ending, events: [light.undone, light.undo.failed, light.undo.broken] }
+    - { src: ending, tgt: removing, events: [belt/down, belt/e_end.ignored] }
+    - { src: ending, tgt: ending, events: e_close }
+    - { src: removing, tgt: shut, events: lamp.undone }
+    - { src: removing, tgt: failed, events: [lamp.undo.failed, lamp.undo.broken] }
+";
+fn hall() -> Demo {
+    let demo = Demo::new();
+    for file in ["conveyor.yaml", "configurations.yaml", "coordinator.yaml"] {
+        let text = std::fs::read_to_string(format!("{}/examples/conveyor/{file}", env!("CARGO_MANIFEST_DIR")));
+        demo.write(file, &text.unwrap());
+    }
+    demo.write("hall.yaml", HALL);
+    demo.write("hall_configurations.yaml", HALL_CONFIGURATIONS);
+    demo.write("hall_coordinator.yaml", HALL_COORDINATOR);
+    demo
+}
+
+/// What the help of the finding says; where the conveyor has not been begun nothing holds it, and nobody is waited for.
+fn hears(demo: &Demo) {
+    for (from, to) in [
+        ("    removing: { entry", "    stopped: {}\n    early: { entry: light.undo }\n    removing: { entry"),
+        ("{ src: making, tgt: dimming", "{ src: making, tgt: early"),
+        ("{ src: lighting, tgt: dimming", "{ src: lighting, tgt: early"),
+        (
+            "    - { src: ending, tgt: removing",
+            "    - { src: dimming, tgt: stopped, events: e_stop }
+    - { src: stopped, tgt: dimming, events: e_close }
+    - { src: early, tgt: removing, events: [light.undone, light.undo.failed, light.undo.broken] }
+    - { src: ending, tgt: removing",
+        ),
+    ] {
+        demo.replace("hall_coordinator.yaml", from, to);
+    }
+}
+
+/// The messages of `coord::safe_left`.
+fn told(demo: &Demo) -> Vec<String> {
+    let checked = demo.run(&["check", "hall.yaml", "--json"]).json();
+    let all = checked["findings"].as_array().unwrap().iter().filter(|one| one["code"] == "coord::safe_left");
+    all.map(|one: &Json| one["message"].as_str().unwrap().to_owned()).collect()
+}
+
+#[test]
+fn who_ends_a_subsystem_by_an_answer_hears_what_stops_it() {
+    let demo = hall();
+    let [one] = &told(&demo)[..] else { panic!("{:?}", told(&demo)) };
+    assert!(one.starts_with("`light.undone` leads from `root.dimming` to `root.ending`"), "{one}");
+    assert!(one.contains("`belt/e_end` is raised") && one.contains("`e_stop`"), "{one}");
+    // By time, and by what the subsystem tells, it is the same.
+    for by in ["e_after(1)", "belt/failed"] {
+        let demo = hall();
+        demo.replace("hall_coordinator.yaml", "[light.undone, light.undo.failed, light.undo.broken]", by);
+        assert!(told(&demo).iter().any(|one| one.starts_with(&format!("`{by}"))), "{by}: {:?}", told(&demo));
+    }
+    // By people it is what they ask for; and so it is where the stop is given to nobody below, or ends nothing there.
+    for (file, from, to) in [
+        ("hall_coordinator.yaml", "[light.undone, light.undo.failed, light.undo.broken]", "e_go"),
+        ("hall.yaml", "safety: e_stop\n", ""),
+        ("coordinator.yaml", "    - { src: held, tgt: down, events: [e_end] }\n", ""),
+    ] {
+        let demo = hall();
+        demo.replace(file, from, to);
+        assert_eq!(told(&demo), [""; 0], "{file}: {from}");
+    }
+}
+
+#[test]
+fn who_follows_the_advice_keeps_it_until_people_ask() {
+    let story = "deploy('hall.yaml') wait_state('hall:open', 2) raise('e_close') wait(0.2) raise('e_stop') wait(3)
+        for _, frame in ipairs(stack()) do say(frame.configuration) end
+        raise('e_close') wait_state('hall:shut', 3) say('shut ' .. #stack())";
+    let said = |demo: &Demo| {
+        demo.write("s.lua", story);
+        let ran = demo.run(&["run", "s.lua", "--clock", "simulated", "--quiet"]);
+        assert_eq!(ran.code, 0, "{}{}", ran.out, ran.err);
+        ran.out.lines().map(str::to_owned).collect::<Vec<_>>()
+    };
+    let demo = hall();
+    hears(&demo);
+    assert_eq!(told(&demo), [""; 0]);
+    // Nor is it held against that one that it waits for people, who raise the end once more.
+    let checked = demo.run(&["check", "hall.yaml"]).err;
+    assert!(!checked.contains("only a second `e_close` leads down"), "{checked}");
+    let told = said(&demo);
+    assert!(told.contains(&"belt/hold".to_owned()), "{told:?}");
+    assert_eq!(told.last().unwrap(), "shut 0");
+}
+
+/// A stop that is heard where one waits, and stays there, keeps nobody from going on.
+#[test]
+fn to_hear_it_and_stay_is_not_enough() {
+    let demo = hall();
+    demo.replace(
+        "hall_coordinator.yaml",
+        "    - { src: ending, tgt: removing",
+        "    - { src: dimming, tgt: dimming, events: e_stop }\n    - { src: ending, tgt: removing",
+    );
+    assert_eq!(told(&demo).len(), 1);
+}
+
+/// Two coordinators of one file are no better than two files.
+#[test]
+fn so_is_one_that_another_coordinator_of_the_file_ends() {
+    let demo = hall();
+    demo.write("hall.yaml", &std::fs::read_to_string(demo.path("conveyor.yaml")).unwrap());
+    demo.replace(
+        "hall.yaml",
+        "coordinator: coordinator.yaml",
+        "coordinators: { belt: coordinator.yaml, lead: lead.yaml }",
+    );
+    demo.write(
+        "lead.yaml",
+        "coordinator:
+  states: { here: {}, away: {} }
+  transitions:
+    - { src: initial, tgt: here }
+    - { src: here, tgt: away, events: e_after(3), effect: e_end }
+",
+    );
+    let found = told(&demo);
+    assert!(
+        found.iter().any(|one| one.contains("`e_end` is raised")),
+        "{found:?}\n{}",
+        demo.run(&["check", "hall.yaml"]).err
+    );
+}

@@ -1,0 +1,190 @@
+//! A bring-up that fails, or is late, while something safe is in force: what stopping it would let go of, and move, nobody has asked for.
+
+use davit::app;
+use davit::lang::LoadOptions;
+use davit::libraries;
+use davit::model::EventName;
+use davit::session::{Command, Happening, NotUp, Session};
+use davit::time::{Clock, Time};
+use std::sync::Arc;
+use std::time::Duration;
+
+/// Two conveyors of the examples, begun and ended together.
+const HALL: &str = "davit: 1
+name: hall
+platform: simulated
+types: {}
+subsystems: { left: { deployment: conveyor.yaml }, right: { deployment: conveyor.yaml } }
+configurations: none.yaml
+coordinator: hall.lua
+safety: e_stop
+deploy:   { event: e_open, up: open, failed: failed, within_s: 300 }
+shutdown: { event: e_close, down: shut, within_s: 5 }
+faults: [{ step: start left/belt, how: slow, takes_s: 3 }, { step: start right/belt, how: slow, takes_s: 3 }]
+";
+const HALL_COORDINATOR: &str = "local function both(how)
+  return state {
+    neither = state {}, left = state {}, right = state {}, both = state {},
+    trans { src = 'initial', tgt = 'neither' },
+    trans { src = 'neither', tgt = 'left',  events = { 'left/'  .. how } },
+    trans { src = 'neither', tgt = 'right', events = { 'right/' .. how } },
+    trans { src = 'left',    tgt = 'both',  events = { 'right/' .. how } },
+    trans { src = 'right',   tgt = 'both',  events = { 'left/'  .. how } },
+  }
+end
+return state {
+  shut = state {}, opening = both('up'), open = state {}, failed = state {}, closing = both('down'),
+  trans { src = 'initial', tgt = 'shut' },
+  trans { src = 'shut', tgt = 'opening', events = { 'e_open' }, effect = { 'left/e_start', 'right/e_start' } },
+  trans { src = 'opening', tgt = 'failed', events = { 'left/failed', 'right/failed' } },
+  trans { src = '.opening.both', tgt = 'open', events = { 'e_done' } },
+  trans { src = 'opening', tgt = 'closing', events = { 'e_close' }, effect = { 'left/e_end', 'right/e_end' } },
+  trans { src = 'failed', tgt = 'closing', events = { 'e_close' }, effect = { 'left/e_end', 'right/e_end' } },
+  trans { src = 'open', tgt = 'closing', events = { 'e_close' }, effect = { 'left/e_end', 'right/e_end' } },
+  trans { src = 'closing', tgt = 'closing', events = { 'e_close' }, effect = { 'left/e_end', 'right/e_end' } },
+  trans { src = '.closing.both', tgt = 'shut', events = { 'e_done' } },
+}";
+/// Waits for its light, and gives up.
+const LAMP: &str = "coordinator:
+  states: { off: {}, trying: {}, on: {}, failed: {} }
+  transitions:
+    - { src: initial, tgt: off }
+    - { src: off, tgt: trying, events: e_start }
+    - { src: trying, tgt: on, events: e_light }
+    - { src: trying, tgt: failed, events: e_after(2) }
+    - { src: trying, tgt: off, events: e_end }
+    - { src: on, tgt: off, events: e_end }
+    - { src: failed, tgt: off, events: e_end }
+";
+
+/// Brought up in simulated time, where somebody is waited for; what is raised at which second, and how that ended.
+struct Hall {
+    session: Arc<Session>,
+    clock: Clock,
+    _guard: davit::time::Guard,
+}
+
+impl Hall {
+    fn new(file: &str, change: impl Fn(&str, String) -> String) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let conveyor = |name: &str| {
+            std::fs::read_to_string(format!("{}/examples/conveyor/{name}", env!("CARGO_MANIFEST_DIR"))).unwrap()
+        };
+        let write = |name: &str, text: String| std::fs::write(folder.path().join(name), change(name, text)).unwrap();
+        ["conveyor.yaml", "configurations.yaml", "coordinator.yaml"]
+            .into_iter()
+            .for_each(|name| write(name, conveyor(name)));
+        for (name, text) in [
+            ("hall.yaml", HALL),
+            ("hall.lua", HALL_COORDINATOR),
+            ("lamp.yaml", LAMP),
+            ("none.yaml", "configurations: {}\n"),
+        ] {
+            write(name, text.to_owned());
+        }
+        let read = app::read(&folder.path().join(file), &LoadOptions::default(), libraries::builtin());
+        let checked = read.and_then(app::check).unwrap_or_else(|refused| panic!("{:#?}", refused.findings));
+        let clock = Clock::simulated();
+        let guard = clock.enter();
+        Self { session: app::start(&checked, &clock).unwrap(), clock, _guard: guard }
+    }
+
+    /// Raises these, each at its second.
+    fn bring_up(&self, raised: &[(f64, &'static str)]) -> (f64, Result<(), NotUp>) {
+        for (at, event) in raised {
+            let (clock, session, event, at) = (self.clock.clone(), self.session.clone(), *event, *at);
+            self.clock.spawn("somebody", move || {
+                clock.sleep(Duration::from_secs_f64(at));
+                match event {
+                    "shutdown" => session.command(Command::Shutdown { force: false }),
+                    event => {
+                        let _ = session.raise(EventName::new(event).unwrap(), "test");
+                    }
+                }
+            });
+        }
+        let ended = self.session.bring_up();
+        (self.clock.now().since(Time::default()).as_secs_f64(), ended)
+    }
+
+    /// When something of that name was told first.
+    fn first(&self, what: &str) -> Option<f64> {
+        let log = self.session.hub().log(usize::MAX);
+        let is = |happening: &Happening| match happening {
+            Happening::Event { event, .. } => event == what,
+            Happening::Answered(answer) => answer.answer == what,
+            Happening::Noted { note } => note.contains(what),
+            _ => false,
+        };
+        log.iter().find(|entry| is(&entry.what)).map(|entry| entry.at)
+    }
+}
+
+#[test]
+fn a_subsystem_that_is_stopped_on_its_way_up_is_not_late() {
+    let hall = Hall::new("hall.yaml", |_, text| text);
+    let (took, not_up) = hall.bring_up(&[(1.0, "e_stop"), (60.0, "shutdown")]);
+    assert!(not_up.unwrap_err().interrupted && took >= 60.0, "{took}");
+    assert_eq!(hall.first("left/failed"), None, "its 5 s stand still");
+    for held in ["left/hold", "right/hold"] {
+        assert!(hall.first(&format!("{held}.ok")).is_some_and(|at| at < 10.0));
+        assert!(hall.first(&format!("{held}.undone")).is_some_and(|at| at >= 60.0), "{held} is let go by people");
+    }
+}
+
+/// A subsystem that is late all the same is told.
+#[test]
+fn a_subsystem_that_nothing_safe_holds_is_late() {
+    let slow = |name: &str, text: String| match name {
+        "hall.yaml" => text.replace("takes_s: 3", "takes_s: 8") + "limits: { step_timeout_s: 30 }\n",
+        _ => text,
+    };
+    let hall = Hall::new("hall.yaml", slow);
+    let (_, not_up) = hall.bring_up(&[]);
+    assert!(not_up.is_err());
+    assert!(hall.first("left/failed").is_some_and(|at| (5.0..5.1).contains(&at)), "{:?}", hall.first("left/failed"));
+}
+
+#[test]
+fn who_resets_one_lets_go_of_no_other() {
+    let hall = Hall::new("hall.yaml", |_, text| text);
+    let (took, not_up) = hall.bring_up(&[(1.0, "e_stop"), (20.0, "left/e_reset"), (80.0, "right/e_reset")]);
+    assert!(!not_up.unwrap_err().interrupted && took >= 80.0, "{took}");
+    assert!(hall.first("left/failed").is_some_and(|at| (20.0..21.0).contains(&at)));
+    assert!(hall.first("it does not come up, since the coordinator is in `failed`").is_some_and(|at| at < 21.0));
+    assert!(hall.first("right/hold.undone").is_some_and(|at| at >= 80.0), "{:?}", hall.first("right/hold.undone"));
+}
+
+/// Another coordinator of the same file that fails meanwhile.
+#[test]
+fn another_coordinator_that_fails_ends_no_emergency() {
+    let two = |name: &str, text: String| match name {
+        "conveyor.yaml" => text
+            .replace("coordinator: coordinator.yaml", "coordinators: { belt: coordinator.yaml, lamp: lamp.yaml }")
+            .replace(
+                "up: running, failed: [failed]",
+                "up: [belt:running, lamp:on], failed: [belt:failed, lamp:failed]",
+            ),
+        _ => text,
+    };
+    let hall = Hall::new("conveyor.yaml", two);
+    let (took, not_up) = hall.bring_up(&[(1.0, "e_stop"), (60.0, "e_reset")]);
+    assert!(!not_up.unwrap_err().interrupted && took >= 60.0, "{took}");
+    assert!(hall.first("hold.undone").is_some_and(|at| at >= 60.0), "{:?}", hall.first("hold.undone"));
+}
+
+/// Where to be stopped means to have failed, that is no reason to let go either, and what makes it safe is waited for.
+#[test]
+fn to_have_failed_by_the_emergency_itself_lets_go_of_nothing() {
+    let three = |name: &str, text: String| match name {
+        "conveyor.yaml" => {
+            text.replace("failed: [failed]", "failed: [failed, held]")
+                + "faults: [{ step: start belt, how: slow, takes_s: 3 }]\n"
+        }
+        _ => text,
+    };
+    let hall = Hall::new("conveyor.yaml", three);
+    let (took, not_up) = hall.bring_up(&[(1.0, "e_stop"), (60.0, "shutdown")]);
+    assert!(not_up.unwrap_err().interrupted && took >= 60.0, "{took}");
+    assert!(hall.first("hold.undone").is_some_and(|at| at >= 60.0), "{:?}", hall.first("hold.undone"));
+}
