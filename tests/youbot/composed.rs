@@ -18,10 +18,13 @@ struct Up {
 }
 
 fn up<T>(file: &str, with: impl FnOnce(&Up) -> T) -> T {
+    up_at(&Path::new(env!("CARGO_MANIFEST_DIR")).join("deployments").join(file), with)
+}
+
+fn up_at<T>(path: &Path, with: impl FnOnce(&Up) -> T) -> T {
     let clock = Clock::simulated();
     let _participant = clock.enter();
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("deployments").join(file);
-    let read = app::read(&path, &LoadOptions::default(), libraries::builtin())
+    let read = app::read(path, &LoadOptions::default(), libraries::builtin())
         .unwrap_or_else(|refused| panic!("{:?}", refused.findings));
     let checked = app::check(read).unwrap_or_else(|refused| panic!("{:?}", refused.findings));
     let session = app::start(&checked, &clock).unwrap();
@@ -36,6 +39,31 @@ fn up<T>(file: &str, with: impl FnOnce(&Up) -> T) -> T {
         assert!(ended.is_orderly(), "{ended:?}");
     }
     result
+}
+
+/// An arm that does not lie on its stops is found where it is: the drives that look for the stops have heard it before they set out.
+#[test]
+fn an_arm_off_its_stops_is_calibrated() {
+    let folder = tempfile::tempdir().unwrap();
+    let home = Path::new(env!("CARGO_MANIFEST_DIR"));
+    for within in ["deployments", "configs/youbot"] {
+        std::fs::create_dir_all(folder.path().join(within)).unwrap();
+        for entry in std::fs::read_dir(home.join(within)).unwrap() {
+            let from = entry.unwrap().path();
+            let text = std::fs::read_to_string(&from).unwrap();
+            let text = match from.ends_with("pair.lua") {
+                true => {
+                    let stops = "\"World.robot1_q_start\", { 0.0, -1.1257, 2.5395, -1.7802, 0.0 }";
+                    assert!(text.contains(stops));
+                    text.replace(stops, "\"World.robot1_q_start\", { 0.0, -0.8257, 2.2395, -1.4802, 0.0 }")
+                }
+                false => text,
+            };
+            std::fs::write(folder.path().join(within).join(from.file_name().unwrap()), text).unwrap();
+        }
+    }
+    let file = folder.path().join("deployments/youbot_coupling.yaml");
+    up_at(&file, |up| assert!(up.session.in_state("left:operational") && up.session.in_state("right:operational")));
 }
 
 impl Up {

@@ -52,7 +52,7 @@ pub static STATE: Object = Object {
         .only(Languages::Yaml),
         key(
             "config",
-            Form::Set(&Form::Name(NameKind::Configuration)),
+            Form::Several(&Form::Name(NameKind::Configuration)),
             "Configurations that are in force while it is active: entering it asks for them, leaving it takes them back.",
             "config = \"enable_copying\"",
             ("config: \"enable copying\"", TEXT_BAD_NAME),

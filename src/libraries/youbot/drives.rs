@@ -284,6 +284,11 @@ impl Drives {
         }
     }
 
+    /// They hear their arm, and it is there.
+    pub fn find(&mut self, measured: Measured) {
+        self.measured = measured;
+    }
+
     /// Whatever is under way ends: a quick stop, then the drives hold the arm where it came to rest. The base stands.
     pub fn hold(&mut self) {
         self.task = DriveTask::Idle;

@@ -253,7 +253,8 @@ impl Component for Driver {
         let effort = aged(&mut self.effort, cx);
         let twist = aged(&mut self.cmd_twist, cx).map(|(t, age)| (t.into(), age));
         let (plant, age) = aged(&mut self.plant_state, cx).unwrap_or((self.plant, f64::INFINITY));
-        if !self.arm_is_there && !self.finds_arm(age <= BUS_TIMEOUT, cx.dt()) {
+        let found = (age <= BUS_TIMEOUT).then(|| measured(&plant));
+        if !self.arm_is_there && !self.finds_arm(found, cx.dt()) {
             return;
         }
         self.plant = plant;

@@ -29,9 +29,14 @@ impl Driver {
         }
     }
 
-    /// Before the arm has been heard: the drives stay off, and all that is written is how they are. Whether it is `heard` now.
-    pub(super) fn finds_arm(&mut self, heard: bool, dt: f64) -> bool {
-        self.arm_is_there = heard;
+    /// Before the arm has been heard: the drives stay off, and all that is written is how they are. Whether it is `heard` now, and where it is then: what is
+    /// held, or moved, begins there.
+    pub(super) fn finds_arm(&mut self, heard: Option<Measured>, dt: f64) -> bool {
+        self.arm_is_there = heard.is_some();
+        if let Some(measured) = heard {
+            self.drives.find(measured);
+        }
+        let heard = heard.is_some();
         if self.task.as_ref().is_some_and(Ticket::is_cancelled) {
             (self.task, self.waits_for_arm) = (None, None);
         }
