@@ -342,7 +342,9 @@ impl Session {
                 .halt()
                 .view(self.hub.outstanding())
                 .map(|view| StoppingView { stands_still: frames.and_then(|frames| self.held_by(frames)), ..view }),
-            stands_still: frames.filter(|_| phase == Phase::Deploying).and_then(|frames| self.held_coming_up(frames)),
+            stands_still: frames
+                .filter(|_| self.hub.phase() == Phase::Deploying)
+                .and_then(|frames| self.held_coming_up(frames)),
             slow: self.slow(),
             dropped: self.parts.iter().map(|part| part.coordinator.dropped()).fold(Dropped::default(), Dropped::and),
             at: self.clock.now().as_secs_f64(),
