@@ -3,7 +3,7 @@
 
 use super::explore::Graph;
 use super::state::Move;
-use crate::model::{EventName, Ident};
+use crate::model::{Deployment, EventName, Ident};
 
 impl Graph<'_, '_> {
     /// Where it has heard an event of safety that is given on to a subsystem which may be there, and waits since then.
@@ -38,12 +38,25 @@ impl Graph<'_, '_> {
     /// The events of safety that are given on to each subsystem in which they make something safe.
     fn given_on(&self) -> Vec<(Ident, Vec<EventName>)> {
         let deployment = self.product.deployment;
-        let safe =
-            deployment.subsystems.iter().filter(|subsystem| subsystem.own.configurations.iter().any(|of| of.safe));
-        let given = safe.map(|subsystem| {
-            let own = |event: &EventName| subsystem.own.safety.iter().any(|(its, _)| its == event);
-            (subsystem.name, deployment.safety.iter().map(|(event, _)| *event).filter(own).collect::<Vec<_>>())
+        let given = deployment.subsystems.iter().map(|subsystem| {
+            let events = given_on(deployment, &subsystem.own);
+            (subsystem.name, events.filter(|event| makes_safe(&subsystem.own, *event)).collect::<Vec<_>>())
         });
         given.filter(|(_, events)| !events.is_empty()).collect()
     }
+}
+
+/// The events of safety of a deployment that are given on to a subsystem of it, or to something in that, however deep.
+pub fn given_on<'a>(deployment: &'a Deployment, inner: &'a Deployment) -> impl Iterator<Item = EventName> + 'a {
+    deployment.safety.iter().map(|(event, _)| *event).filter(|event| declares(inner, *event))
+}
+
+fn declares(own: &Deployment, event: EventName) -> bool {
+    own.safety.iter().any(|(its, _)| *its == event) || own.subsystems.iter().any(|inner| declares(&inner.own, event))
+}
+
+/// Whether something safe may come of an event of safety there, or in something in it.
+fn makes_safe(own: &Deployment, event: EventName) -> bool {
+    let here = own.safety.iter().any(|(its, _)| *its == event) && own.configurations.iter().any(|of| of.safe);
+    here || own.subsystems.iter().any(|inner| makes_safe(&inner.own, event))
 }

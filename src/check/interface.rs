@@ -92,7 +92,12 @@ fn events(deployment: &Deployment, charts: &[&Chart], findings: &mut Findings) {
         if charts.iter().all(|chart| chart.event(*event) == EventId::OTHER) {
             let known: Vec<&str> = charts.iter().flat_map(|chart| chart.events()).map(|event| event.as_str()).collect();
             let message = format!("`{event}` is accepted, and no transition waits for it: it would always be ignored");
-            let help = did_you_mean(event.as_str(), "events", known);
+            let accepted = |event: &&str| interface.accepts.iter().any(|(accepted, _)| accepted.as_str() == *event);
+            // Which of the two is the slip is not known here.
+            let help = match nearest(event.as_str(), known.iter().copied().filter(|event| !accepted(event))) {
+                Some(near) => format!("did the transition that waits for `{near}` mean `{event}`?"),
+                None => did_you_mean(event.as_str(), "events", known),
+            };
             findings.push(Finding::warning(COMPOSE_UNKNOWN, message).at(*origin).path("accepts").help(help));
         }
     }

@@ -5,10 +5,11 @@
 //! Who hears that event where it waits, and goes elsewhere, waits for people from then on.
 
 use super::coordinator::{ask_of, edges, place};
+use super::held_below::given_on;
 use super::led_on::{HeldSafe, held};
 use crate::model::codes::COORD_SAFE_LEFT;
 use crate::model::{Ask, Deployment, EventName, Finding, Findings, Ident, Verdict};
-use crate::statechart::{Chart, EdgeId, EventId, NodeId, NodeKind, RaiseMoment, compile};
+use crate::statechart::{Chart, EdgeId, EventId, NodeId, NodeKind, RaiseMoment, RaiseSite, compile};
 use rustc_hash::FxHashSet;
 use std::collections::BTreeMap;
 
@@ -42,8 +43,7 @@ fn below(deployment: &Deployment) -> LetsGo {
         let inner = below(own);
         let charts: Vec<Chart> = own.charts().filter_map(|chart| compile(chart).0).collect();
         let events: FxHashSet<EventName> = charts.iter().flat_map(|chart| let_go_by(own, chart, &inner)).collect();
-        let given = deployment.safety.iter().map(|(event, _)| *event);
-        let given: Vec<EventName> = given.filter(|event| own.safety.iter().any(|(its, _)| its == event)).collect();
+        let given: Vec<EventName> = given_on(deployment, own).collect();
         if given.is_empty() {
             continue;
         }
@@ -65,10 +65,13 @@ fn let_go_by(deployment: &Deployment, chart: &Chart, below: &LetsGo) -> FxHashSe
     let is_safe = |ask: Ask| matches!(ask, Ask::UndoOf(id) if deployment.configuration(id).is_some_and(|of| of.safe));
     let mut all = FxHashSet::default();
     for edge in edges(chart) {
+        // What an exit takes back is looked at as what is held.
+        let takes_back = |site: &RaiseSite| {
+            let exits = matches!(site.when, RaiseMoment::Exit(_));
+            !exits && !site.scoped && ask_of(deployment, site.name).is_some_and(is_safe)
+        };
         let lets_go = held.iter().any(|of: &HeldSafe| of.is_left_by(deployment, chart, edge))
-            || raised_by(chart, edge).any(|(name, scoped)| {
-                below.contains_key(&name) || !scoped && ask_of(deployment, name).is_some_and(is_safe)
-            });
+            || raised_by(chart, edge).any(|site| below.contains_key(&site.name) || takes_back(site));
         if lets_go {
             let triggers = chart.triggers(edge).unwrap_or(&[]);
             all.extend(triggers.iter().filter_map(|event| EventName::new(&chart.event_text(*event)).ok()));
@@ -77,46 +80,68 @@ fn let_go_by(deployment: &Deployment, chart: &Chart, below: &LetsGo) -> FxHashSe
     all
 }
 
-/// What is raised where a transition is taken, and whether it is a state-scoped configuration's.
-fn raised_by(chart: &Chart, edge: EdgeId) -> impl Iterator<Item = (EventName, bool)> + '_ {
-    let entered = entered(chart, edge);
+/// What is raised where a transition is taken.
+fn raised_by(chart: &Chart, edge: EdgeId) -> impl Iterator<Item = &RaiseSite> + '_ {
+    let taken = Taken::of(chart, edge);
     let by = move |when: RaiseMoment| match when {
-        RaiseMoment::Effect(of) => of == edge,
-        RaiseMoment::Entry(node) => entered.contains(&node),
-        RaiseMoment::Exit(_) => false,
+        RaiseMoment::Effect(of) => taken.edges.contains(&of),
+        RaiseMoment::Entry(node) => taken.entered.contains(&node),
+        RaiseMoment::Exit(node) => taken.leaves(chart, node),
     };
-    chart.raises().iter().filter(move |site| by(site.when)).map(|site| (site.name, site.scoped))
+    chart.raises().iter().filter(move |site| by(site.when))
 }
 
-/// The states that a transition enters, those behind connectors among them.
-fn entered(chart: &Chart, edge: EdgeId) -> FxHashSet<NodeId> {
-    let (mut all, mut seen, mut open) = (FxHashSet::default(), FxHashSet::default(), vec![edge]);
-    while let Some(edge) = open.pop() {
-        if !seen.insert(edge) {
-            continue;
+/// What a transition does, that behind connectors with it.
+struct Taken {
+    source: NodeId,
+    /// What is inside of this stays.
+    stays: NodeId,
+    edges: FxHashSet<EdgeId>,
+    entered: FxHashSet<NodeId>,
+}
+
+impl Taken {
+    fn of(chart: &Chart, edge: EdgeId) -> Self {
+        let (source, stays) = (chart.ends(edge).0, chart.least_common_ancestor(edge));
+        let mut taken = Self { source, stays, edges: FxHashSet::default(), entered: FxHashSet::default() };
+        let mut open = vec![edge];
+        while let Some(edge) = open.pop() {
+            if !taken.edges.insert(edge) {
+                continue;
+            }
+            let ((_, target), stays) = (chart.ends(edge), chart.least_common_ancestor(edge));
+            let outwards = std::iter::successors(Some(target), |node| chart.parent(*node));
+            taken.entered.extend(outwards.take_while(|node| *node != stays));
+            if chart.kind(target) == NodeKind::Connector {
+                open.extend(chart.outgoing(target));
+            }
         }
-        let ((_, target), stays) = (chart.ends(edge), chart.least_common_ancestor(edge));
-        let outwards = std::iter::successors(Some(target), |node| chart.parent(*node));
-        all.extend(outwards.take_while(|node| *node != stays));
-        if chart.kind(target) == NodeKind::Connector {
-            open.extend(chart.outgoing(target));
-        }
+        taken
     }
-    all
+
+    /// Whether a state is left, if it is active: the source, what is in it, and what is around it as far as that goes.
+    fn leaves(&self, chart: &Chart, node: NodeId) -> bool {
+        let around = chart.is_inside(self.source, node) && node != self.stays && chart.is_inside(node, self.stays);
+        chart.is_inside(node, self.source) || around
+    }
 }
 
 /// The finding of a transition that comes unasked, and lets go of somebody who may have been made safe meanwhile.
 fn unasked(deployment: &Deployment, chart: &Chart, edge: EdgeId, lets_go: &LetsGo) -> Option<Finding> {
-    let by = by(deployment, chart, edge)?;
     let (source, target) = chart.ends(edge);
-    let unheard = |event: &&EventName| !is_heard(chart, edge, **event);
-    let (raised, safety) = raised_by(chart, edge).find_map(|(name, _)| {
-        let safety = lets_go.get(&name)?.iter().find(unheard)?;
-        Some((name, *safety))
+    let (by, raised, safety) = raised_by(chart, edge).find_map(|site| {
+        let (raised, safeties) = (site.name, lets_go.get(&site.name)?);
+        let unheard = |event: &&EventName| !is_heard(chart, edge, **event, lets_go);
+        let by_itself = || Some((by(deployment, chart, edge)?, *safeties.iter().find(unheard)?));
+        // It comes of the stop itself.
+        let at_once = |event: &&EventName| chart.triggers(edge).is_some_and(|all| all.contains(&chart.event(**event)));
+        let at_once = safeties.iter().find(at_once).map(|safety| (format!("`{safety}`"), *safety));
+        let (by, safety) = at_once.or_else(by_itself)?;
+        Some((by, raised, safety))
     })?;
     let message = format!(
-        "{by} leads from `{}` to `{}`, where `{raised}` is raised: what `{safety}` has made safe there meanwhile is let go, and nobody said \
-         that the emergency is over",
+        "{by} leads from `{}` to `{}`, and `{raised}` is raised on that way: what `{safety}` has made safe there meanwhile is let go, and \
+         nobody said that the emergency is over",
         chart.fqn(source),
         chart.fqn(target)
     );
@@ -131,7 +156,12 @@ fn unasked(deployment: &Deployment, chart: &Chart, edge: EdgeId, lets_go: &LetsG
 
 /// What takes a transition without anybody having said so, in words.
 fn by(deployment: &Deployment, chart: &Chart, edge: EdgeId) -> Option<String> {
-    let triggers = chart.triggers(edge)?;
+    // What leads out of a connector comes of what led into it.
+    let triggers = match chart.triggers(edge) {
+        _ if !chart.is_state(chart.ends(edge).0) => return None,
+        None | Some([]) => return Some("whatever comes next".to_owned()),
+        Some(triggers) => triggers,
+    };
     let comes_by_itself = |event: &&EventId| {
         let text = chart.event_text(**event);
         let is_answer = Verdict::split(&text).is_some() && deployment.looks_like_answer(&text);
@@ -143,12 +173,15 @@ fn by(deployment: &Deployment, chart: &Chart, edge: EdgeId) -> Option<String> {
     triggers.iter().find(comes_by_itself).map(|event| format!("`{}`", chart.event_text(*event)))
 }
 
-/// Whether an event of safety is heard where a transition begins, and leads away from there.
-fn is_heard(chart: &Chart, edge: EdgeId, safety: EventName) -> bool {
+/// Whether an event of safety is heard where a transition begins, leads away from there, and lets go of nothing itself.
+fn is_heard(chart: &Chart, edge: EdgeId, safety: EventName, lets_go: &LetsGo) -> bool {
     let (source, event) = (chart.ends(edge).0, chart.event(safety));
     edges(chart).any(|other| {
         let (from, to) = chart.ends(other);
         let there = chart.is_inside(source, from) || chart.is_inside(from, source);
-        there && !chart.is_inside(to, source) && chart.triggers(other).is_some_and(|all| all.contains(&event))
+        let leads_away = there && !chart.is_inside(to, source);
+        leads_away
+            && chart.triggers(other).is_some_and(|all| all.contains(&event))
+            && !raised_by(chart, other).any(|site| lets_go.contains_key(&site.name))
     })
 }

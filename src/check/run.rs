@@ -19,7 +19,10 @@ use super::{
     left_unanswered, library, listeners, monitors as watched, moves_back, paths, purity, safety, settings, simulated,
     slips, types, unasked, undriven, unhandled, universe, unwatched, ways,
 };
-use crate::model::codes::{CLASH, COORD_NO_WAY_DOWN, POST_ON_DESTROYED, PRE_ON_CREATED, TOUCHES_DESTROYED};
+use crate::model::codes::{
+    CLASH, COMPOSE_UNKNOWN, COMPOSE_UNLEFT, COORD_NEAR_EVENT, COORD_NO_WAY_DOWN, DEPLOY_NEVER_DOWN, DEPLOY_NEVER_UP,
+    POST_ON_DESTROYED, PRE_ON_CREATED, TOUCHES_DESTROYED,
+};
 use crate::model::naming::Naming;
 use crate::model::{
     Catalogue, Code, ConfigId, Deployment, EventName, Finding, Findings, MemberRef, Severity, StepFault,
@@ -132,6 +135,7 @@ fn run_one(
             } else {
                 (explored, shows, idle) = follow(&those, &mut traced, &mut left);
             }
+            slip_first(&mut traced);
             // Where there is an actuator, more is said of it.
             let said = |finding: &crate::model::Finding| {
                 traced.iter().any(|(f, _)| (f.code, f.origin.0) == (finding.code, finding.origin.0))
@@ -152,6 +156,23 @@ fn run_one(
     let verdict = CheckVerdict::of(&findings, charts.len() == all, left.clone());
     let checked = (verdict != CheckVerdict::Refused).then(|| Accepted::new(shared.clone()));
     (Report { checked, replayed, findings, traces, explored, left, verdict }, shows)
+}
+
+/// A way that stops has stopped at a slip, where there is one: that is said first.
+fn slip_first(traced: &mut Traced) {
+    let is_slip = |finding: &Finding| {
+        let near = finding.help.as_deref().is_some_and(|help| help.starts_with("did "));
+        near && [COORD_NEAR_EVENT, COMPOSE_UNKNOWN].contains(&finding.code)
+    };
+    let Some(slip) = traced.iter().find(|(finding, _)| is_slip(finding)).map(|(slip, _)| slip.in_a_line()) else {
+        return;
+    };
+    let follows = [DEPLOY_NEVER_UP, DEPLOY_NEVER_DOWN, COMPOSE_UNLEFT];
+    let stops = |finding: &Finding| follows.contains(&finding.code);
+    for (finding, _) in traced.iter_mut().filter(|(finding, _)| stops(finding)) {
+        let help = finding.help.take().map(|help| format!(" If that is not it: {help}")).unwrap_or_default();
+        finding.help = Some(format!("{slip}{help}"));
+    }
 }
 
 /// What is followed.

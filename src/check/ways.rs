@@ -13,7 +13,8 @@ use super::trace::TraceStep;
 use super::tried::{Goal, Way};
 use crate::limits;
 use crate::model::codes::{DEPLOY_BY_HAND, DEPLOY_LEFTOVERS, DEPLOY_NEVER_DOWN, DEPLOY_NEVER_UP, STACK_SQUASHED};
-use crate::model::{Catalogue, Code, Deployment, EventName, Finding, Origin, Severity, Verdict};
+use crate::model::finding::nearest;
+use crate::model::{Ask, Catalogue, Code, ConfigId, Deployment, EventName, Finding, Origin, Severity, Verdict};
 use crate::stack::Request;
 use crate::statechart::{Chart, NodeId};
 use std::collections::BTreeSet;
@@ -275,7 +276,12 @@ fn by_hand(product: &Product<'_>, way: &Way, up: bool) -> Option<Finding> {
     let leaf = hears.map_or(Origin::NONE, |number| product.members[number].chart.origin(state.leaves[number]));
     let (what, key) = if up { ("bring-up", "deploy.up") } else { ("shutdown", "shutdown.event") };
     let message = format!("the {what} waits in `{place}` for `{event}`, which nothing here raises");
-    let answer = "is it an answer, as `ID.ok`, that leads on?";
+    let may_be = may_be(deployment);
+    let near = nearest(event.as_str(), may_be.iter().map(String::as_str));
+    let answer = near.map_or_else(
+        || "is it an answer, as `ID.ok`, that leads on?".to_owned(),
+        |near| format!("did you mean `{near}`?"),
+    );
     let help = match up {
         true => format!(
             "{answer} If people raise it, name in `deploy.up` where it waits for them; else it fails {} s after `{begins}`",
@@ -289,6 +295,17 @@ fn by_hand(product: &Product<'_>, way: &Way, up: bool) -> Option<Finding> {
     };
     let finding = Finding::warning(DEPLOY_BY_HAND, message).help(help);
     Some(finding.also(leaf, "waits here").at(deployment.key_origin(key)).path(key))
+}
+
+/// What may be meant where nothing raises what is waited for: answers, and what the deployment accepts.
+fn may_be(deployment: &Deployment) -> Vec<String> {
+    let answers = |id: ConfigId| {
+        let of = |ask: Ask, well: Verdict| [well.event(ask), ask.failed().event(ask), ask.broken().event(ask)];
+        of(Ask::Apply(id), Verdict::Ok).into_iter().chain(of(Ask::UndoOf(id), Verdict::Undone))
+    };
+    let answers = deployment.named_configurations().flat_map(|configuration| answers(configuration.id));
+    let accepted = deployment.interface.accepts.iter().map(|(event, _)| *event);
+    answers.chain(accepted).map(|event| event.to_string()).collect()
 }
 
 /// The subsystems that nobody ever tells what begins them, or ends them: what to do about it. Of one file only its own are asked for.

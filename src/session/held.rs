@@ -21,6 +21,11 @@ impl Session {
         Ok(self.hub().applies(is_safe) || holds(&self.frames()?, is_safe, None, began))
     }
 
+    /// Whether an event of safety has come since then: what is safe then is no coordinator's own way to fail.
+    pub(super) fn is_alarmed(&self, began: Time) -> bool {
+        self.junction().alarmed_since(began)
+    }
+
     /// What keeps it from coming up, of these frames, before people decide.
     pub(super) fn held_coming_up(&self, frames: &[FrameView]) -> Option<StandsStill> {
         let safe = frames.iter().find(|frame| self.is_safe(frame.configuration))?;

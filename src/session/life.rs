@@ -88,8 +88,10 @@ impl Session {
                 break ("a coordinator has ended".to_owned(), false);
             }
             // Stopped in an emergency: what stopping it would move, nobody has asked for.
-            if let Some(state) = self.failed_state().filter(|_| !self.has_safe() || self.has_reacted()) {
+            let emergency = self.is_alarmed(start);
+            if let Some(state) = self.failed_state().filter(|_| !emergency || self.has_reacted()) {
                 match self.waits_for_people(start) {
+                    _ if !emergency => break (format!("the coordinator is in `{state}`"), false),
                     Ok(true) => {
                         if !std::mem::replace(&mut told, true) {
                             self.tell_held(&format!("it does not come up, since the coordinator is in `{state}`"));

@@ -11,8 +11,8 @@ use crate::coordinator::{ChartTrouble, Class, CoordinatorHandle, Delivered, Inco
 use crate::model::{Ask, Deployment, EventName, FAULTED, Ident, Precedence, RequestId, Verdict};
 use crate::platform::PlatformEvent;
 use crate::statechart::{Chart, EventId, FunctionOutput, NodeId, Raised};
-use crate::time::lock;
-use rustc_hash::FxHashMap;
+use crate::time::{Time, lock};
+use rustc_hash::{FxHashMap, FxHashSet};
 use smallvec::SmallVec;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, Weak};
@@ -42,6 +42,9 @@ pub(super) struct Junction {
     pub has_parent: AtomicBool,
     /// Nobody drives it any more.
     closed: AtomicBool,
+    /// Events of safety, its own and those of its subsystems, and when one was taken up last.
+    alarms: FxHashSet<EventName>,
+    alarmed: Mutex<Option<Time>>,
     /// Held while an event is given to several coordinators: what one of them tells the others of it comes behind it everywhere.
     giving: Mutex<()>,
 }
@@ -52,7 +55,16 @@ impl Junction {
         let urgent = deployment.urgent().map(|event| (event, deployment.precedence(event))).collect();
         let ends = Some((deployment.deploy.event, deployment.shutdown.event));
         let leaving = deployment.interface.leaving.map(|leaving| (leaving.says, leaving.until));
-        Self { urgent, ends, subsystems: Some(subsystems), leaving, ..Self::default() }
+        let mut alarms: FxHashSet<EventName> = deployment.safety.iter().map(|(event, _)| *event).collect();
+        for (path, subsystem) in deployment.all_subsystems() {
+            alarms.extend(subsystem.own.safety.iter().map(|(event, _)| event.within(path)));
+        }
+        Self { urgent, ends, subsystems: Some(subsystems), leaving, alarms, ..Self::default() }
+    }
+
+    /// Whether a coordinator has taken up an event of safety since then.
+    pub fn alarmed_since(&self, began: Time) -> bool {
+        lock(&self.alarmed).is_some_and(|at| at >= began)
     }
 
     /// Its subsystems, if it has any.
@@ -216,6 +228,9 @@ impl Listener for ToConfigurator {
 
     fn delivers(&mut self, event: EventName) {
         let Some(junction) = self.junction.upgrade() else { return };
+        if junction.alarms.contains(&event) {
+            *lock(&junction.alarmed) = Some(self.hub.now());
+        }
         self.begins = junction.begins(event);
         self.led = junction.subsystems().and_then(|subsystems| subsystems.takes_up(self.name, event));
         if let Some(configurator) = self.configurator() {

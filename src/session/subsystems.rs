@@ -390,10 +390,8 @@ impl Subsystems {
         let (own, hub, junction): (_, _, Weak<Junction>) = (self.clone(), hub.clone(), Arc::downgrade(junction));
         self.clock.spawn("subsystems", move || {
             loop {
-                let now = own.clock.now();
-                let of = |life: &SubsystemLife| {
-                    life.up_until.into_iter().chain(life.down_until).filter(|until| *until > now).min()
-                };
+                // One that is over meanwhile is looked at at once.
+                let of = |life: &SubsystemLife| life.until().filter(|_| !life.is_late);
                 let next = lock(&own.lives).iter().filter_map(of).min();
                 own.wake.wait(next.unwrap_or(Time::NEVER));
                 let Some(junction) = junction.upgrade() else { return };

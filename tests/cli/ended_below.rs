@@ -101,6 +101,16 @@ fn who_ends_a_subsystem_by_an_answer_hears_what_stops_it() {
         demo.replace("hall_coordinator.yaml", "[light.undone, light.undo.failed, light.undo.broken]", by);
         assert!(told(&demo).iter().any(|one| one.starts_with(&format!("`{by}"))), "{by}: {:?}", told(&demo));
     }
+    // So it is where that is raised on leaving, by the stop itself, and by whatever comes next.
+    for (from, to, by) in [
+        ("dimming: { entry: light.undo }", "dimming: { entry: light.undo, exit: belt/e_end }", "`light.undone`"),
+        ("[light.undone, light.undo.failed, light.undo.broken]", "[light.undo.broken, e_stop]", "`e_stop`"),
+        (", events: [light.undone, light.undo.failed, light.undo.broken] }", " }", "whatever comes next"),
+    ] {
+        let demo = hall();
+        demo.replace("hall_coordinator.yaml", from, to);
+        assert!(told(&demo).iter().any(|one| one.starts_with(by)), "{by}: {:?}", told(&demo));
+    }
     // By people it is what they ask for; and so it is where the stop is given to nobody below, or ends nothing there.
     for (file, from, to) in [
         ("hall_coordinator.yaml", "[light.undone, light.undo.failed, light.undo.broken]", "e_go"),

@@ -155,6 +155,20 @@ fn who_resets_one_lets_go_of_no_other() {
     assert!(hall.first("right/hold.undone").is_some_and(|at| at >= 80.0), "{:?}", hall.first("right/hold.undone"));
 }
 
+/// What makes itself safe since its bring-up has failed is stopped as ever: nobody has stopped anything.
+#[test]
+fn to_fail_safely_is_no_emergency() {
+    let safely = |name: &str, text: String| match name {
+        "conveyor.yaml" => text + "faults: [{ step: start belt, how: fail }]\n",
+        "coordinator.yaml" => text.replace("    failed: {}", "    failed: { config: hold }"),
+        _ => text,
+    };
+    let hall = Hall::new("conveyor.yaml", safely);
+    let (took, not_up) = hall.bring_up(&[(60.0, "shutdown")]);
+    assert!(!not_up.unwrap_err().interrupted && took < 5.0, "{took}");
+    assert!(hall.first("hold.ok").is_some(), "it was made safe");
+}
+
 /// Another coordinator of the same file that fails meanwhile.
 #[test]
 fn another_coordinator_that_fails_ends_no_emergency() {
