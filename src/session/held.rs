@@ -4,7 +4,7 @@
 use super::halt::StandsStill;
 use super::hub::Hub;
 use super::{Session, Unanswered};
-use crate::configurator::{ConfiguratorHandle, FrameView};
+use crate::configurator::{ConfiguratorHandle, FrameView, Requester};
 use crate::limits;
 use crate::model::{ConfigId, Ident};
 use crate::time::{Clock, Time};
@@ -21,7 +21,18 @@ impl Session {
         Ok(self.hub().applies(is_safe) || holds(&self.frames()?, is_safe, None, began))
     }
 
-    /// Whether an event of safety has come since then: what is safe then is no coordinator's own way to fail.
+    /// The same of a bring-up that has failed: what a coordinator makes safe since that failed, and nobody has stopped anything, is its own way to
+    /// fail.
+    pub(super) fn fails_in_emergency(&self, began: Time) -> Result<bool, Unanswered> {
+        if self.is_alarmed(began) || !self.attended.load(Ordering::Relaxed) || !self.has_safe() {
+            return self.waits_for_people(began);
+        }
+        let by_people = |frame: &FrameView| !matches!(frame.by, Requester::Coordinator(_));
+        let safe = |frame: &FrameView| frame.at >= began && self.is_safe(frame.configuration);
+        Ok(self.frames()?.iter().any(|frame| safe(frame) && by_people(frame)))
+    }
+
+    /// Whether an event of safety has come since then.
     pub(super) fn is_alarmed(&self, began: Time) -> bool {
         self.junction().alarmed_since(began)
     }

@@ -3,6 +3,7 @@
 use super::log::{Happening, Phase};
 use super::stages::Stage;
 use super::{Command, Session, Unanswered};
+use crate::limits;
 use crate::model::{Ident, Snapshot};
 use crate::time::Time;
 use crate::time::clock::panic_text;
@@ -88,10 +89,8 @@ impl Session {
                 break ("a coordinator has ended".to_owned(), false);
             }
             // Stopped in an emergency: what stopping it would move, nobody has asked for.
-            let emergency = self.is_alarmed(start);
-            if let Some(state) = self.failed_state().filter(|_| !emergency || self.has_reacted()) {
-                match self.waits_for_people(start) {
-                    _ if !emergency => break (format!("the coordinator is in `{state}`"), false),
+            if let Some(state) = self.failed_state().filter(|_| !self.is_alarmed(start) || self.has_reacted()) {
+                match self.fails_in_emergency(start) {
                     Ok(true) => {
                         if !std::mem::replace(&mut told, true) {
                             self.tell_held(&format!("it does not come up, since the coordinator is in `{state}`"));
@@ -117,7 +116,9 @@ impl Session {
                 }
             }
             let now = self.clock().now();
-            if now >= deadline {
+            // What came at the very end of its time is to be heard: it may be an emergency.
+            let heard = !self.has_safe() || self.has_reacted() || now >= deadline + limits::VIEW;
+            if now >= deadline && heard {
                 match self.waits_for_people(start) {
                     Ok(true) => {
                         deadline = now + bring_up.within;
@@ -129,7 +130,7 @@ impl Session {
                     _ => {}
                 }
             }
-            if now >= deadline {
+            if now >= deadline && heard {
                 let waiting = hub.outstanding();
                 break (
                     format!(
@@ -146,7 +147,8 @@ impl Session {
                 );
             }
             self.tell_slow();
-            hub.changed.wait(self.next_look(deadline));
+            let looks = if now >= deadline { deadline + limits::VIEW } else { deadline };
+            hub.changed.wait(self.next_look(looks));
         };
         ticket.into_iter().for_each(|ticket| hub.forget(ticket));
         let reasons = self.failures_since(began);

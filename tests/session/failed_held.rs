@@ -155,6 +155,26 @@ fn who_resets_one_lets_go_of_no_other() {
     assert!(hall.first("right/hold.undone").is_some_and(|at| at >= 80.0), "{:?}", hall.first("right/hold.undone"));
 }
 
+/// A stop at the very moment when the time of the bring-up is over was before its end.
+#[test]
+fn a_stop_in_the_last_moment_holds() {
+    for delay in ["4.999", "5.0", "5.001"] {
+        let late = |name: &str, text: String| match name {
+            "conveyor.yaml" => {
+                text + &format!(
+                    "faults: [{{ step: start belt, how: slow, takes_s: 8 }}]\nlimits: {{ step_timeout_s: 30 }}\n\
+                     simulated: {{ reactions: [{{ after: create belt, raise: e_stop, component: belt, delay_s: {delay} }}] }}\n"
+                )
+            }
+            _ => text,
+        };
+        let hall = Hall::new("conveyor.yaml", late);
+        let (took, not_up) = hall.bring_up(&[(60.0, "shutdown")]);
+        assert!(not_up.unwrap_err().interrupted && took >= 60.0, "{delay}: {took}");
+        assert!(hall.first("hold.undone").is_some_and(|at| at >= 60.0), "{delay}: {:?}", hall.first("hold.undone"));
+    }
+}
+
 /// What makes itself safe since its bring-up has failed is stopped as ever: nobody has stopped anything.
 #[test]
 fn to_fail_safely_is_no_emergency() {
