@@ -70,6 +70,12 @@ pub const SOCKET_STEP: Duration = Duration::from_millis(10);
 /// How often a command that follows a quiet deployment looks whether anybody reads it still.
 pub const FOLLOW_LOOK: Duration = Duration::from_millis(250);
 
+/// How long after the end of its time a bring-up is looked at once more: what came at that moment is heard first.
+pub const LAST_LOOK: Duration = Duration::from_micros(700);
+
+/// How often a subsystem whose time is over is looked at while something safe holds it.
+pub const HELD_LOOK: Duration = Duration::from_millis(500);
+
 /// How long stopping stands still, held by a safe configuration, before it is told what leads on.
 pub const STANDS_TOLD: Duration = Duration::from_secs(2);
 

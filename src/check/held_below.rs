@@ -39,20 +39,16 @@ impl Graph<'_, '_> {
     fn given_on(&self) -> Vec<(Ident, Vec<EventName>)> {
         let deployment = self.product.deployment;
         let given = deployment.subsystems.iter().map(|subsystem| {
-            let events = given_on(deployment, &subsystem.own);
+            let events = deployment.safety.iter().map(|(event, _)| *event);
             (subsystem.name, events.filter(|event| makes_safe(&subsystem.own, *event)).collect::<Vec<_>>())
         });
         given.filter(|(_, events)| !events.is_empty()).collect()
     }
 }
 
-/// The events of safety of a deployment that are given on to a subsystem of it, or to something in that, however deep.
-pub fn given_on<'a>(deployment: &'a Deployment, inner: &'a Deployment) -> impl Iterator<Item = EventName> + 'a {
-    deployment.safety.iter().map(|(event, _)| *event).filter(|event| declares(inner, *event))
-}
-
-fn declares(own: &Deployment, event: EventName) -> bool {
-    own.safety.iter().any(|(its, _)| *its == event) || own.subsystems.iter().any(|inner| declares(&inner.own, event))
+/// Whether an event of safety is given on to a subsystem, or to something in it, however deep.
+pub fn is_given_on(event: EventName, own: &Deployment) -> bool {
+    own.safety.iter().any(|(its, _)| *its == event) || own.subsystems.iter().any(|inner| is_given_on(event, &inner.own))
 }
 
 /// Whether something safe may come of an event of safety there, or in something in it.

@@ -5,20 +5,21 @@
 //! Who hears that event where it waits, and goes elsewhere, waits for people from then on.
 
 use super::coordinator::{ask_of, edges, place};
-use super::held_below::given_on;
+use super::held_below::is_given_on;
 use super::led_on::{HeldSafe, held};
 use crate::model::codes::COORD_SAFE_LEFT;
+use crate::model::statechart::is_internal;
 use crate::model::{Ask, Deployment, EventName, Finding, Findings, Ident, Verdict};
 use crate::statechart::{Chart, EdgeId, EventId, NodeId, NodeKind, RaiseMoment, RaiseSite, compile};
 use rustc_hash::FxHashSet;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Events that let go of what is safe, each with the events of safety by which it came to be.
 type LetsGo = BTreeMap<EventName, Vec<EventName>>;
 
 /// Transitions of these coordinators by which a subsystem, or another one of them, is let go unasked.
 pub fn check(deployment: &Deployment, charts: &[&Chart]) -> Findings {
-    let below = below(deployment);
+    let below = below(deployment, &BTreeSet::new());
     let mut findings = Findings::new();
     for (number, chart) in charts.iter().enumerate() {
         let mut lets_go = below.clone();
@@ -35,15 +36,17 @@ pub fn check(deployment: &Deployment, charts: &[&Chart]) -> Findings {
     findings
 }
 
-/// What lets go of subsystems, by the names that their parent has for it.
-fn below(deployment: &Deployment) -> LetsGo {
+/// What lets go of subsystems, by the names that their parent has for it. `above`: events of safety of those around it, which are given on past it.
+fn below(deployment: &Deployment, above: &BTreeSet<EventName>) -> LetsGo {
     let mut all = LetsGo::new();
+    let safety: BTreeSet<EventName> =
+        deployment.safety.iter().map(|(event, _)| *event).chain(above.iter().copied()).collect();
     for subsystem in &deployment.subsystems {
         let own = &*subsystem.own;
-        let inner = below(own);
+        let inner = below(own, &safety);
         let charts: Vec<Chart> = own.charts().filter_map(|chart| compile(chart).0).collect();
         let events: FxHashSet<EventName> = charts.iter().flat_map(|chart| let_go_by(own, chart, &inner)).collect();
-        let given: Vec<EventName> = given_on(deployment, own).collect();
+        let given: Vec<EventName> = safety.iter().copied().filter(|event| is_given_on(*event, own)).collect();
         if given.is_empty() {
             continue;
         }
@@ -168,20 +171,21 @@ fn by(deployment: &Deployment, chart: &Chart, edge: EdgeId) -> Option<String> {
         let is_told = text
             .split_once('/')
             .is_some_and(|(path, _)| deployment.subsystems.iter().any(|subsystem| subsystem.name.as_str() == path));
-        chart.time_of(**event).is_some() || is_answer || is_told
+        let completes = is_internal(&text);
+        chart.time_of(**event).is_some() || completes || is_answer || is_told
     };
     triggers.iter().find(comes_by_itself).map(|event| format!("`{}`", chart.event_text(*event)))
 }
 
-/// Whether an event of safety is heard where a transition begins, leads away from there, and lets go of nothing itself.
+/// Whether an event of safety is heard wherever a transition may begin, leads away from there, and lets go of nothing itself.
 fn is_heard(chart: &Chart, edge: EdgeId, safety: EventName, lets_go: &LetsGo) -> bool {
     let (source, event) = (chart.ends(edge).0, chart.event(safety));
-    edges(chart).any(|other| {
-        let (from, to) = chart.ends(other);
-        let there = chart.is_inside(source, from) || chart.is_inside(from, source);
-        let leads_away = there && !chart.is_inside(to, source);
-        leads_away
-            && chart.triggers(other).is_some_and(|all| all.contains(&event))
-            && !raised_by(chart, other).any(|site| lets_go.contains_key(&site.name))
-    })
+    let leads_away = |other: &EdgeId| {
+        chart.triggers(*other).is_some_and(|all| all.contains(&event))
+            && !chart.is_inside(chart.ends(*other).1, source)
+            && !raised_by(chart, *other).any(|site| lets_go.contains_key(&site.name))
+    };
+    let hearing: FxHashSet<NodeId> = edges(chart).filter(leads_away).map(|other| chart.ends(other).0).collect();
+    let mut leaves = chart.nodes().filter(|node| chart.kind(*node) == NodeKind::Leaf && chart.is_inside(*node, source));
+    leaves.all(|leaf| std::iter::successors(Some(leaf), |node| chart.parent(*node)).any(|node| hearing.contains(&node)))
 }

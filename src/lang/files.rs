@@ -99,7 +99,8 @@ impl Sources {
             }
         };
         // Some editors begin a text with a mark of its encoding, which is none of its letters.
-        let text = |text: String| text.strip_prefix('\u{feff}').map_or_else(|| text.clone(), str::to_owned);
+        let text =
+            |text: String| if text.starts_with('\u{feff}') { text['\u{feff}'.len_utf8()..].to_owned() } else { text };
         String::from_utf8(bytes).map(text).map_err(|error| {
             let valid = error.utf8_error().valid_up_to();
             let line = error.as_bytes()[..valid].iter().filter(|b| **b == b'\n').count() + 1;

@@ -39,7 +39,8 @@ impl Session {
 
     /// What keeps it from coming up, of these frames, before people decide.
     pub(super) fn held_coming_up(&self, frames: &[FrameView]) -> Option<StandsStill> {
-        let safe = frames.iter().find(|frame| self.is_safe(frame.configuration))?;
+        let held = self.coming_up_held.load(Ordering::Relaxed);
+        let safe = frames.iter().find(|frame| held && self.is_safe(frame.configuration))?;
         let leads_on = "an event that its coordinator hears leads on, `davit shutdown` leads it down".to_owned();
         Some(StandsStill { safe: safe.configuration.to_string(), since: safe.at.as_secs_f64(), leads_on })
     }
@@ -60,15 +61,19 @@ impl SafeOnes {
         Self(ids.into_iter().collect())
     }
 
-    /// Whether one that came since then holds a subsystem. Who does not answer is no reason.
-    pub fn hold(&self, clock: &Clock, hub: &Hub, configurator: &ConfiguratorHandle, path: Ident, since: Time) -> bool {
+    /// The frames in force, to be asked about several subsystems; none: nobody answers.
+    pub fn frames(&self, clock: &Clock, configurator: Option<&ConfiguratorHandle>) -> Option<Vec<FrameView>> {
         if self.0.is_empty() {
-            return false;
+            return Some(Vec::new());
         }
+        Some(configurator?.view(false, clock.now() + limits::VIEW)?.stack.clone())
+    }
+
+    /// Whether one that came since then holds a subsystem. While nobody knows it is as it was: one that may be held is not late.
+    pub fn hold(&self, hub: &Hub, frames: Option<&[FrameView]>, path: Ident, since: Time) -> bool {
         let is_safe = |id: ConfigId| self.0.contains(&id);
-        let view = || configurator.view(false, clock.now() + limits::VIEW);
         hub.applies(|id| is_safe(id) && concerns(id, path))
-            || view().is_some_and(|view| holds(&view.stack, is_safe, Some(path), since))
+            || frames.is_none_or(|frames| holds(frames, is_safe, Some(path), since))
     }
 }
 

@@ -10,6 +10,8 @@ use crate::time::clock::panic_text;
 use serde::{Deserialize, Serialize};
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::Ordering;
+use std::time::Duration;
 
 /// How a deployment ended.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -79,7 +81,7 @@ impl Session {
                 None
             }
         };
-        let (mut force, mut unanswered, mut told) = (false, false, false);
+        let (mut force, mut unanswered, mut told, mut failed_told, mut held) = (false, false, false, false, false);
         let why = loop {
             if let Some(Command::Shutdown { force: by_force }) = self.pending_command() {
                 force = by_force;
@@ -92,8 +94,10 @@ impl Session {
             if let Some(state) = self.failed_state().filter(|_| !self.is_alarmed(start) || self.has_reacted()) {
                 match self.fails_in_emergency(start) {
                     Ok(true) => {
-                        if !std::mem::replace(&mut told, true) {
-                            self.tell_held(&format!("it does not come up, since the coordinator is in `{state}`"));
+                        unanswered = false;
+                        if !std::mem::replace(&mut failed_told, true) {
+                            let why = format!("it does not come up, since the coordinator is in `{state}`");
+                            self.tell_held(&why, "when that is let go it is led down");
                         }
                     }
                     // It may be one: asked once more, before anything moves.
@@ -102,6 +106,7 @@ impl Session {
                 }
             }
             if self.is_up() {
+                self.coming_up_held.store(false, Ordering::Relaxed);
                 ticket.into_iter().for_each(|ticket| hub.forget(ticket));
                 hub.set_phase(Phase::Up);
                 return Ok(());
@@ -117,15 +122,19 @@ impl Session {
             }
             let now = self.clock().now();
             // What came at the very end of its time is to be heard: it may be an emergency.
-            let heard = !self.has_safe() || self.has_reacted() || now >= deadline + limits::VIEW;
+            let heard = !self.has_safe()
+                || now >= deadline + limits::LAST_LOOK && (self.has_reacted() || now >= deadline + limits::VIEW);
             if now >= deadline && heard {
                 match self.waits_for_people(start) {
                     Ok(true) => {
-                        deadline = now + bring_up.within;
+                        (held, deadline) = (true, now + bring_up.within.min(limits::HELD_LOOK));
                         if !std::mem::replace(&mut told, true) {
-                            self.tell_held(&format!("not up after {} s", now.since(start).as_secs_f64().round()));
+                            let why = format!("not up after {} s", now.since(start).as_secs_f64().round());
+                            self.tell_held(&why, "an event that its coordinator hears leads on");
                         }
                     }
+                    // Let go of, it has its time anew.
+                    Ok(false) if std::mem::take(&mut held) => deadline = now + bring_up.within,
                     Err(Unanswered) if !std::mem::replace(&mut unanswered, true) => deadline = now + bring_up.within,
                     _ => {}
                 }
@@ -147,9 +156,11 @@ impl Session {
                 );
             }
             self.tell_slow();
-            let looks = if now >= deadline { deadline + limits::VIEW } else { deadline };
+            let looks = [Duration::ZERO, limits::LAST_LOOK, limits::VIEW].map(|behind| deadline + behind);
+            let looks = looks.into_iter().find(|look| *look > now).unwrap_or(deadline);
             hub.changed.wait(self.next_look(looks));
         };
+        self.coming_up_held.store(false, Ordering::Relaxed);
         ticket.into_iter().for_each(|ticket| hub.forget(ticket));
         let reasons = self.failures_since(began);
         let ended = self.stop(force, true);
@@ -157,10 +168,10 @@ impl Session {
     }
 
     /// It does not come up since something safe came, and nothing is stopped before people ask for it.
-    fn tell_held(&self, why: &str) {
+    fn tell_held(&self, why: &str, leads_on: &str) {
+        self.coming_up_held.store(true, Ordering::Relaxed);
         let note = format!(
-            "{why}, and a safe configuration is in force: an event that its coordinator hears leads on (`davit status` says where it is), \
-             `davit shutdown` leads it down"
+            "{why}, and something safe holds it: {leads_on} (`davit status` says where it is), `davit shutdown` leads it down"
         );
         self.hub().note(Happening::Noted { note });
     }

@@ -48,6 +48,8 @@ struct SubsystemLife {
     since: Time,
     /// The one or the other is over, and nothing safe holds it.
     is_late: bool,
+    /// It is over, and something safe holds it.
+    is_held: bool,
     /// It was down with nothing left, and has asked for nothing since.
     empty: bool,
 }
@@ -251,11 +253,11 @@ impl Subsystems {
         match ends {
             false if heeded => {
                 (life.up_until, life.down_until, life.told) = (Some(now + known.up_within), None, None);
-                (life.since, life.is_late) = (now, false);
+                (life.since, life.is_late, life.is_held) = (now, false, false);
             }
             true if heeded || !is_down => {
                 (life.down_until, life.up_until) = (Some(now + known.down_within), None);
-                (life.since, life.is_late) = (now, false);
+                (life.since, life.is_late, life.is_held) = (now, false, false);
                 life.told.take_if(|_| is_down);
             }
             _ => return,
@@ -404,26 +406,31 @@ impl Subsystems {
         });
     }
 
-    /// Those are late whose time is over. Where something safe holds one that came since its time began, that begins anew: it waits for people.
+    /// Those are late whose time is over. Where something safe holds one that came since its time began, it waits for people; its time begins anew when
+    /// they let go.
     fn times_are_over(&self, hub: &Hub, junction: &Junction) {
         let now = self.clock.now();
         let over = |life: &SubsystemLife| life.until().filter(|until| !life.is_late && *until <= now);
+        if !lock(&self.lives).iter().any(|life| over(life).is_some()) {
+            return;
+        }
+        let configurator = lock(&junction.configurator).clone();
+        let frames = self.safe.frames(&self.clock, configurator.as_ref());
         for (at, known) in self.all.iter().enumerate() {
             let (until, since, within) = {
                 let life = &lock(&self.lives)[at];
                 let Some(until) = over(life) else { continue };
                 (until, life.since, if life.up_until.is_some() { known.up_within } else { known.down_within })
             };
-            let configurator = lock(&junction.configurator).clone();
-            let held = configurator.is_some_and(|of| self.safe.hold(&self.clock, hub, &of, known.path, since));
+            let held = self.safe.hold(hub, frames.as_deref(), known.path, since);
             let life = &mut lock(&self.lives)[at];
             // It may have been begun, or ended, meanwhile.
             if life.until() == Some(until) {
-                match held {
-                    true => {
-                        life.up_until.iter_mut().chain(&mut life.down_until).for_each(|until| *until = now + within)
-                    }
-                    false => life.is_late = true,
+                let was_held = std::mem::replace(&mut life.is_held, held);
+                life.is_late = !held && !was_held;
+                let next = now + if held { within.min(limits::HELD_LOOK) } else { within };
+                if !life.is_late {
+                    life.up_until.iter_mut().chain(&mut life.down_until).for_each(|until| *until = next);
                 }
             }
         }
@@ -463,6 +470,7 @@ mod tests {
             down_until: down_until.map(Time),
             since: Time::default(),
             is_late: false,
+            is_held: false,
             empty: false,
         };
         let failed = Some(SubsystemStanding::Failed);

@@ -67,6 +67,8 @@ pub struct Session {
     commanded: Mutex<Option<Arc<AtomicBool>>>,
     /// Somebody is there who may ask for force.
     pub(super) attended: AtomicBool,
+    /// Something safe keeps it from coming up, and that was told.
+    pub(super) coming_up_held: AtomicBool,
     ended: Mutex<Option<Ended>>,
 }
 
@@ -126,6 +128,7 @@ impl Session {
             commands: Mutex::new(Vec::new()),
             commanded: Mutex::default(),
             attended: AtomicBool::new(true),
+            coming_up_held: AtomicBool::new(false),
             ended: Mutex::new(None),
         })
     }
@@ -342,9 +345,7 @@ impl Session {
                 .halt()
                 .view(self.hub.outstanding())
                 .map(|view| StoppingView { stands_still: frames.and_then(|frames| self.held_by(frames)), ..view }),
-            stands_still: frames
-                .filter(|_| self.hub.phase() == Phase::Deploying)
-                .and_then(|frames| self.held_coming_up(frames)),
+            stands_still: frames.and_then(|frames| self.held_coming_up(frames)),
             slow: self.slow(),
             dropped: self.parts.iter().map(|part| part.coordinator.dropped()).fold(Dropped::default(), Dropped::and),
             at: self.clock.now().as_secs_f64(),

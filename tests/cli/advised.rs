@@ -105,7 +105,7 @@ fn a_finding_that_there_is_not() {
 fn other_texts() {
     let demo = Demo::new();
     demo.write("story.lua", "deploy(\"x.yaml\")\n");
-    says(&demo.run(&["sim", "story.lua"]), 2, &["`deploy` is of scripts", "`davit run` runs a script"]);
+    says(&demo.run(&["sim", "story.lua"]), 1, &["`deploy` is of scripts", "`davit run` runs a script"]);
     demo.write("say.lua", "\u{feff}#!/usr/bin/env davit\nsay(\"hello\")\n");
     assert_eq!(demo.run(&["run", "say.lua", "--clock", "simulated"]).out, "hello\n");
     demo.write("c.lua", "\u{feff}return state { idle = state {}, trans { src = \"initial\", tgt = \"idle\" } }\n");

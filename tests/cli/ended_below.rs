@@ -52,6 +52,29 @@ const HALL_COORDINATOR: &str = "coordinator:
     - { src: removing, tgt: shut, events: lamp.undone }
     - { src: removing, tgt: failed, events: [lamp.undo.failed, lamp.undo.broken] }
 ";
+/// Passes a conveyor on.
+const LINE: &str = "davit: 1
+name: line
+platform: simulated
+types: {}
+subsystems: { inner: { deployment: conveyor.yaml } }
+configurations: none.yaml
+coordinator: line.lua
+deploy:   { event: e_start, up: on, failed: failed, within_s: 8 }
+shutdown: { event: e_end, down: off, within_s: 8 }
+";
+const LINE_COORDINATOR: &str = "return state {
+  off = state {}, raising = state { entry = 'inner/e_start' }, on = state {}, failed = state {}, ending = state { entry = 'inner/e_end' },
+  trans { src = 'initial', tgt = 'off' },
+  trans { src = 'off', tgt = 'raising', events = { 'e_start' } },
+  trans { src = 'raising', tgt = 'on', events = { 'inner/up' } },
+  trans { src = 'raising', tgt = 'failed', events = { 'inner/failed' } },
+  trans { src = 'raising', tgt = 'ending', events = { 'e_end' } },
+  trans { src = 'failed', tgt = 'ending', events = { 'e_end' } },
+  trans { src = 'on', tgt = 'ending', events = { 'e_end' } },
+  trans { src = 'ending', tgt = 'off', events = { 'inner/down', 'inner/e_end.ignored' } },
+}";
+
 fn hall() -> Demo {
     let demo = Demo::new();
     for file in ["conveyor.yaml", "configurations.yaml", "coordinator.yaml"] {
@@ -111,6 +134,22 @@ fn who_ends_a_subsystem_by_an_answer_hears_what_stops_it() {
         demo.replace("hall_coordinator.yaml", from, to);
         assert!(told(&demo).iter().any(|one| one.starts_with(by)), "{by}: {:?}", told(&demo));
     }
+    // Where it is heard in a part of the state alone, and past a file in between that knows of no event of safety.
+    let demo = hall();
+    demo.replace("hall_coordinator.yaml", "dimming: { entry: light.undo }", "dimming: { entry: light.undo, states: { a: {}, b: {} }, transitions: [{ src: initial, tgt: a }, { src: a, tgt: b, events: e_on }] }");
+    demo.replace("hall_coordinator.yaml", "    removing: { entry", "    stopped: {}\n    removing: { entry");
+    demo.replace(
+        "hall_coordinator.yaml",
+        "    - { src: ending, tgt: removing",
+        "    - { src: dimming.b, tgt: stopped, events: e_stop }\n    - { src: stopped, tgt: dimming, events: e_close }\n    - { src: ending, tgt: removing",
+    );
+    assert_eq!(told(&demo).len(), 1, "{}", demo.run(&["check", "hall.yaml"]).err);
+    let demo = hall();
+    demo.replace("hall.yaml", "deployment: conveyor.yaml", "deployment: line.yaml");
+    demo.write("line.yaml", LINE);
+    demo.write("line.lua", LINE_COORDINATOR);
+    demo.write("none.yaml", "configurations: {}\n");
+    assert!(told(&demo).iter().any(|one| one.contains("`belt/e_end`")), "{}", demo.run(&["check", "hall.yaml"]).err);
     // By people it is what they ask for; and so it is where the stop is given to nobody below, or ends nothing there.
     for (file, from, to) in [
         ("hall_coordinator.yaml", "[light.undone, light.undo.failed, light.undo.broken]", "e_go"),

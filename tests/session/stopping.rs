@@ -421,7 +421,7 @@ fn an_emergency_on_the_way_up_stops_the_time() {
     assert!(took >= 60.0 && not_up.interrupted, "{took}: {not_up:?}");
     let log = small.session.hub().log(usize::MAX);
     let told = log.iter().filter(
-        |entry| matches!(&entry.what, Happening::Noted { note } if note.starts_with("not up after 20 s, and a safe")),
+        |entry| matches!(&entry.what, Happening::Noted { note } if note.starts_with("not up after 20 s, and something safe")),
     );
     assert_eq!(told.count(), 1, "who waits for it to come up is told why it does not");
     let calls = small.steps().iter().filter(|step| step.contains("a.raise")).count();
