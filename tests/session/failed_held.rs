@@ -132,48 +132,6 @@ fn a_subsystem_that_is_stopped_on_its_way_up_is_not_late() {
     }
 }
 
-/// Warms up for 2 s, and begins that anew when it is let go of.
-const WARMING: &str = "coordinator:
-  states: { off: {}, building: { entry: build }, warming: {}, held: { config: hold }, running: {}, failed: {}, ending: { entry: build.undo } }
-  transitions:
-    - { src: initial, tgt: off }
-    - { src: off, tgt: building, events: e_start }
-    - { src: building, tgt: warming, events: build.ok }
-    - { src: building, tgt: failed, events: [build.failed, build.broken] }
-    - { src: warming, tgt: running, events: e_after(2) }
-    - { src: warming, tgt: held, events: e_stop }
-    - { src: running, tgt: held, events: e_stop }
-    - { src: building, tgt: held, events: e_stop }
-    - { src: failed, tgt: held, events: e_stop }
-    - { src: ending, tgt: held, events: e_stop }
-    - { src: held, tgt: held, events: e_stop }
-    - { src: held, tgt: warming, events: e_reset }
-    - { src: held, tgt: ending, events: e_end }
-    - { src: building, tgt: ending, events: e_end }
-    - { src: warming, tgt: ending, events: e_end }
-    - { src: running, tgt: ending, events: e_end }
-    - { src: failed, tgt: ending, events: e_end }
-    - { src: ending, tgt: off, events: build.undone }
-    - { src: ending, tgt: failed, events: [build.undo.failed, build.undo.broken] }
-";
-
-/// Let go of 0.1 s before its 5 s would be over once more, it has its time anew, and comes up in that.
-#[test]
-fn who_is_let_go_of_has_its_time_anew() {
-    let warming = |name: &str, text: String| {
-        match name {
-        "coordinator.yaml" => WARMING.to_owned(),
-        "hall.yaml" => text.replace("faults: [{ step: start left/belt, how: slow, takes_s: 3 }, { step: start right/belt, how: slow, takes_s: 3 }]", ""),
-        _ => text,
-    }
-    };
-    let hall = Hall::new("hall.yaml", warming);
-    let raised = [(1.0, "e_stop"), (9.9, "left/e_reset"), (9.9, "right/e_reset"), (60.0, "shutdown")];
-    let (took, up) = hall.bring_up(&raised);
-    assert!(up.is_ok() && (11.8..12.0).contains(&took), "{took}: {up:?}");
-    assert_eq!(hall.first("left/failed"), None);
-}
-
 /// A subsystem that is late all the same is told.
 #[test]
 fn a_subsystem_that_nothing_safe_holds_is_late() {
@@ -212,7 +170,7 @@ fn a_stop_in_the_last_moment_holds() {
         };
         let hall = Hall::new("conveyor.yaml", late);
         let (took, not_up) = hall.bring_up(&[(60.0, "shutdown")]);
-        assert!(not_up.unwrap_err().interrupted && took >= 60.0, "{delay}: {took}");
+        assert!(not_up.is_err() && took >= 60.0, "{delay}: {took}");
         assert!(hall.first("hold.undone").is_some_and(|at| at >= 60.0), "{delay}: {:?}", hall.first("hold.undone"));
     }
 }
