@@ -98,7 +98,7 @@ impl Hall {
                 match event {
                     "shutdown" => session.command(Command::Shutdown { force: false }),
                     event => {
-                        let _ = session.raise(EventName::new(event).unwrap(), "test");
+                        session.raise(EventName::new(event).unwrap(), "test");
                     }
                 }
             });
