@@ -31,6 +31,7 @@ pub fn check(deployment: &Deployment, charts: &[&Chart]) -> Findings {
         }
         if !lets_go.is_empty() {
             findings.extend(edges(chart).filter_map(|edge| unasked(deployment, chart, edge, &lets_go)));
+            findings.extend(leading_there(deployment, chart, &lets_go));
         }
     }
     findings
@@ -131,7 +132,6 @@ impl Taken {
 
 /// The finding of a transition that comes unasked, and lets go of somebody who may have been made safe meanwhile.
 fn unasked(deployment: &Deployment, chart: &Chart, edge: EdgeId, lets_go: &LetsGo) -> Option<Finding> {
-    let (source, target) = chart.ends(edge);
     let (by, raised, safety) = raised_by(chart, edge).find_map(|site| {
         let (raised, safeties) = (site.name, lets_go.get(&site.name)?);
         let unheard = |event: &&EventName| !is_heard(chart, edge, **event, lets_go);
@@ -142,9 +142,55 @@ fn unasked(deployment: &Deployment, chart: &Chart, edge: EdgeId, lets_go: &LetsG
         let (by, safety) = at_once.or_else(by_itself)?;
         Some((by, raised, safety))
     })?;
+    Some(finding(
+        deployment,
+        chart,
+        edge,
+        &format!("{by} leads"),
+        (&format!("and `{raised}` is raised on that way"), safety),
+    ))
+}
+
+/// Transitions that come unasked and lead on, unasked, to where somebody is let go of: the stop may have come before the first of them.
+fn leading_there(deployment: &Deployment, chart: &Chart, lets_go: &LetsGo) -> Findings {
+    let by_itself: Vec<(EdgeId, String)> =
+        edges(chart).filter_map(|edge| Some((edge, by(deployment, chart, edge)?))).collect();
+    let lets_go_of =
+        |edge: EdgeId| raised_by(chart, edge).map(|site| site.name).find(|name| lets_go.contains_key(name));
+    let mut open: Vec<(EdgeId, EventName)> =
+        by_itself.iter().filter_map(|(edge, _)| Some((*edge, lets_go_of(*edge)?))).collect();
+    let mut seen: FxHashSet<EdgeId> = open.iter().map(|(edge, _)| *edge).collect();
+    let mut findings = Findings::new();
+    while let Some((edge, raised)) = open.pop() {
+        let source = chart.ends(edge).0;
+        let leads = |before: EdgeId| {
+            let from_outside = !chart.is_inside(chart.ends(before).0, source);
+            from_outside && Taken::of(chart, before).entered.iter().any(|node| chart.is_inside(*node, source))
+        };
+        for (before, by) in by_itself.iter().filter(|(before, _)| leads(*before)) {
+            if !seen.insert(*before) {
+                continue;
+            }
+            open.push((*before, raised));
+            if let Some(safety) = lets_go[&raised].iter().find(|event| !is_heard(chart, *before, **event, lets_go)) {
+                let how = format!("and by itself on to where `{raised}` is raised");
+                findings.push(finding(deployment, chart, *before, &format!("{by} leads"), (&how, *safety)));
+            }
+        }
+    }
+    findings
+}
+
+fn finding(
+    deployment: &Deployment,
+    chart: &Chart,
+    edge: EdgeId,
+    leads: &str,
+    (how, safety): (&str, EventName),
+) -> Finding {
+    let (source, target) = chart.ends(edge);
     let message = format!(
-        "{by} leads from `{}` to `{}`, and `{raised}` is raised on that way: what `{safety}` has made safe there meanwhile is let go, and \
-         nobody said that the emergency is over",
+        "{leads} from `{}` to `{}`, {how}: what `{safety}` has made safe there meanwhile is let go, and nobody said that the emergency is over",
         chart.fqn(source),
         chart.fqn(target)
     );
@@ -154,7 +200,7 @@ fn unasked(deployment: &Deployment, chart: &Chart, edge: EdgeId, lets_go: &LetsG
         deployment.shutdown.event
     );
     let finding = Finding::warning(COORD_SAFE_LEFT, message).at(chart.edge_origin(edge));
-    Some(finding.path(place(chart, RaiseMoment::Effect(edge))).help(help))
+    finding.path(place(chart, RaiseMoment::Effect(edge))).help(help)
 }
 
 /// What takes a transition without anybody having said so, in words.

@@ -106,7 +106,8 @@ fn a_near_event_is_a_slip_where_it_is_near_enough_and_nobody_declares_it() {
     assert_eq!(listens(&["e_rest"], "accepts: [e_reset]\n"), 0);
     let more = "trans { src = \"building\", tgt = \"leaving\", events = { \"e_rest\" } },";
     let told = check(more, "accepts: [e_reset]\n");
-    assert!(texts(&told, "compose::unknown").iter().any(|(_, help)| *help == "did you mean `e_rest`?"), "{:#}", told.0);
+    let asks = "did the transition that waits for `e_rest` mean `e_reset`?";
+    assert!(texts(&told, "compose::unknown").iter().any(|(_, help)| *help == asks), "{:#}", told.0);
     let heard = "trans { src = \"up\", tgt = \"leaving\", events = { \"e_rest\", \"e_reset\" } },";
     assert_eq!(
         check(heard, "accepts: [e_reset]\n").of("coord::near_event").len(),

@@ -134,6 +134,33 @@ fn who_ends_a_subsystem_by_an_answer_hears_what_stops_it() {
         demo.replace("hall_coordinator.yaml", from, to);
         assert!(told(&demo).iter().any(|one| one.starts_with(by)), "{by}: {:?}", told(&demo));
     }
+    // A way that begins by itself before that, and what is held that is left by time.
+    let demo = hall();
+    demo.replace(
+        "hall_coordinator.yaml",
+        "{ src: open, tgt: dimming, events: e_close }",
+        "{ src: open, tgt: closing, events: e_close }",
+    );
+    demo.replace("hall_coordinator.yaml", "    removing: { entry", "    closing: {}\n    removing: { entry");
+    demo.replace(
+        "hall_coordinator.yaml",
+        "    - { src: ending, tgt: removing",
+        "    - { src: closing, tgt: dimming, events: e_after(1) }\n    - { src: ending, tgt: removing",
+    );
+    let found = told(&demo);
+    assert!(
+        found.len() == 2 && found.iter().any(|one| one.contains("by itself on to where `belt/e_end` is raised")),
+        "{found:?}"
+    );
+    let demo = hall();
+    hears(&demo);
+    demo.replace(
+        "hall_coordinator.yaml",
+        "{ src: stopped, tgt: dimming, events: e_close }",
+        "{ src: stopped, tgt: dimming, events: [e_close, e_after(2)] }",
+    );
+    let found = told(&demo);
+    assert!(found.len() == 1 && found[0].starts_with("`e_after(2)"), "{found:?}");
     // Where it is heard in a part of the state alone, and past a file in between that knows of no event of safety.
     let demo = hall();
     demo.replace("hall_coordinator.yaml", "dimming: { entry: light.undo }", "dimming: { entry: light.undo, states: { a: {}, b: {} }, transitions: [{ src: initial, tgt: a }, { src: a, tgt: b, events: e_on }] }");
