@@ -225,7 +225,7 @@ fn execute(path: &Path, text: &str, host: &SharedHost) -> Result<(), ScriptFailu
 fn no_unknown_names(path: &Path, text: &str, lua: &Lua) -> Result<(), ScriptFailure> {
     let globals = lua.globals();
     let known = |name: &str| globals.raw_get::<LuaValue>(name).is_ok_and(|value| !value.is_nil());
-    let unknown = lang::unknown_names(text, known);
+    let unknown = lang::unknown_names(functions::without_hash_bang(text), known);
     if unknown.is_empty() {
         return Ok(());
     }
