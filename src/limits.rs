@@ -73,6 +73,9 @@ pub const FOLLOW_LOOK: Duration = Duration::from_millis(250);
 /// How long after the end of its time a bring-up is looked at once more: what came at that moment is heard first.
 pub const LAST_LOOK: Duration = Duration::from_micros(700);
 
+/// How many events are named of those that lead on from where something stands still.
+pub const EVENTS_NAMED: usize = 3;
+
 /// How often a subsystem whose time is over is looked at while something safe holds it.
 pub const HELD_LOOK: Duration = Duration::from_millis(500);
 

@@ -3,12 +3,13 @@
 
 use super::explore::Graph;
 use super::state::Move;
+use super::stops_below::Stop;
 use crate::model::{Deployment, EventName, Ident};
 
 impl Graph<'_, '_> {
-    /// Where it has heard an event of safety that is given on to a subsystem which may be there, and waits since then.
+    /// Where it has heard an event of safety that is given on to a subsystem which may be there, or that one is stopped, and waits since then.
     pub(super) fn waits_below(&self) -> Vec<bool> {
-        let given = self.given_on();
+        let given = self.heard_below();
         let mut waits = vec![false; self.states.len()];
         if given.is_empty() {
             return waits;
@@ -35,20 +36,17 @@ impl Graph<'_, '_> {
         waits
     }
 
-    /// The events of safety that are given on to each subsystem in which they make something safe.
-    fn given_on(&self) -> Vec<(Ident, Vec<EventName>)> {
+    /// The events of safety that are given on to each subsystem in which they make something safe, and what it tells where it is stopped alone.
+    fn heard_below(&self) -> Vec<(Ident, Vec<EventName>)> {
         let deployment = self.product.deployment;
-        let given = deployment.subsystems.iter().map(|subsystem| {
+        let heard = deployment.subsystems.iter().map(|subsystem| {
             let events = deployment.safety.iter().map(|(event, _)| *event);
-            (subsystem.name, events.filter(|event| makes_safe(&subsystem.own, *event)).collect::<Vec<_>>())
+            let given = events.filter(|event| makes_safe(&subsystem.own, *event));
+            let alone = Stop::alone(subsystem).into_iter().flat_map(|stop| stop.heard);
+            (subsystem.name, given.chain(alone).collect::<Vec<_>>())
         });
-        given.filter(|(_, events)| !events.is_empty()).collect()
+        heard.filter(|(_, events)| !events.is_empty()).collect()
     }
-}
-
-/// Whether an event of safety is given on to a subsystem, or to something in it, however deep.
-pub fn is_given_on(event: EventName, own: &Deployment) -> bool {
-    own.safety.iter().any(|(its, _)| *its == event) || own.subsystems.iter().any(|inner| is_given_on(event, &inner.own))
 }
 
 /// Whether something safe may come of an event of safety there, or in something in it.

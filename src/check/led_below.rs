@@ -2,20 +2,23 @@
 //! by what people ask for.
 //!
 //! A coordinator may come to that by an answer, by time, or by what a subsystem tells it, after the event of safety that made it safe below.
-//! Who hears that event where it waits, and goes elsewhere, waits for people from then on.
+//! Who hears that event where it waits, and goes elsewhere, waits for people from then on. A subsystem may be stopped alone, too, by somebody
+//! there, its components or its monitors: then its parent hears what that emits of it, or nothing.
 
 use super::coordinator::{ask_of, edges, place};
-use super::held_below::is_given_on;
+
 use super::led_on::{HeldSafe, held};
+use super::stops_below::{Stop, compiled, is_given_on};
+use super::taken::{Taken, raised_by};
 use crate::model::codes::COORD_SAFE_LEFT;
 use crate::model::statechart::is_internal;
-use crate::model::{Ask, Deployment, EventName, Finding, Findings, Ident, Verdict};
-use crate::statechart::{Chart, EdgeId, EventId, NodeId, NodeKind, RaiseMoment, RaiseSite, compile};
+use crate::model::{Ask, Deployment, EventName, Finding, Findings, Verdict};
+use crate::statechart::{Chart, EdgeId, EventId, NodeId, NodeKind, RaiseMoment, RaiseSite};
 use rustc_hash::FxHashSet;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Events that let go of what is safe, each with the events of safety by which it came to be.
-type LetsGo = BTreeMap<EventName, Vec<EventName>>;
+/// Events that let go of what is safe, each with the stops by which it came to be.
+type LetsGo = BTreeMap<EventName, Vec<Stop>>;
 
 /// Transitions of these coordinators by which a subsystem, or another one of them, is let go unasked.
 pub fn check(deployment: &Deployment, charts: &[&Chart]) -> Findings {
@@ -26,7 +29,9 @@ pub fn check(deployment: &Deployment, charts: &[&Chart]) -> Findings {
         let others = charts.iter().enumerate().filter(|(other, _)| *other != number);
         for (_, other) in others {
             for event in let_go_by(deployment, other, &below) {
-                lets_go.entry(event).or_insert_with(|| deployment.safety.iter().map(|(event, _)| *event).collect());
+                lets_go
+                    .entry(event)
+                    .or_insert_with(|| deployment.safety.iter().map(|(event, _)| Stop::given(*event)).collect());
             }
         }
         if !lets_go.is_empty() {
@@ -45,22 +50,16 @@ fn below(deployment: &Deployment, above: &BTreeSet<EventName>) -> LetsGo {
     for subsystem in &deployment.subsystems {
         let own = &*subsystem.own;
         let inner = below(own, &safety);
-        let charts: Vec<Chart> = own.charts().filter_map(|chart| compile(chart).0).collect();
+        let charts = compiled(own);
         let events: FxHashSet<EventName> = charts.iter().flat_map(|chart| let_go_by(own, chart, &inner)).collect();
-        let given: Vec<EventName> = safety.iter().copied().filter(|event| is_given_on(*event, own)).collect();
-        if given.is_empty() {
-            continue;
-        }
+        let given = safety.iter().copied().filter(|event| is_given_on(*event, own)).map(Stop::given);
+        let stops: Vec<Stop> = given.chain(Stop::alone(subsystem)).collect();
         let accepts = own.interface.accepts.iter().map(|(event, _)| *event);
         for event in accepts.chain([own.deploy.event, own.shutdown.event]).filter(|event| events.contains(event)) {
-            all.insert(within(subsystem.name, event), given.clone());
+            all.insert(event.within(subsystem.name), stops.clone());
         }
     }
     all
-}
-
-fn within(path: Ident, event: EventName) -> EventName {
-    EventName::new(&format!("{path}/{event}")).expect("an event with a path is one")
 }
 
 /// The events by which a coordinator lets go of what is safe, its own or that of a subsystem.
@@ -84,70 +83,24 @@ fn let_go_by(deployment: &Deployment, chart: &Chart, below: &LetsGo) -> FxHashSe
     all
 }
 
-/// What is raised where a transition is taken.
-fn raised_by(chart: &Chart, edge: EdgeId) -> impl Iterator<Item = &RaiseSite> + '_ {
-    let taken = Taken::of(chart, edge);
-    let by = move |when: RaiseMoment| match when {
-        RaiseMoment::Effect(of) => taken.edges.contains(&of),
-        RaiseMoment::Entry(node) => taken.entered.contains(&node),
-        RaiseMoment::Exit(node) => taken.leaves(chart, node),
-    };
-    chart.raises().iter().filter(move |site| by(site.when))
-}
-
-/// What a transition does, that behind connectors with it.
-struct Taken {
-    source: NodeId,
-    /// What is inside of this stays.
-    stays: NodeId,
-    edges: FxHashSet<EdgeId>,
-    entered: FxHashSet<NodeId>,
-}
-
-impl Taken {
-    fn of(chart: &Chart, edge: EdgeId) -> Self {
-        let (source, stays) = (chart.ends(edge).0, chart.least_common_ancestor(edge));
-        let mut taken = Self { source, stays, edges: FxHashSet::default(), entered: FxHashSet::default() };
-        let mut open = vec![edge];
-        while let Some(edge) = open.pop() {
-            if !taken.edges.insert(edge) {
-                continue;
-            }
-            let ((_, target), stays) = (chart.ends(edge), chart.least_common_ancestor(edge));
-            let outwards = std::iter::successors(Some(target), |node| chart.parent(*node));
-            taken.entered.extend(outwards.take_while(|node| *node != stays));
-            if chart.kind(target) == NodeKind::Connector {
-                open.extend(chart.outgoing(target));
-            }
-        }
-        taken
-    }
-
-    /// Whether a state is left, if it is active: the source, what is in it, and what is around it as far as that goes.
-    fn leaves(&self, chart: &Chart, node: NodeId) -> bool {
-        let around = chart.is_inside(self.source, node) && node != self.stays && chart.is_inside(node, self.stays);
-        chart.is_inside(node, self.source) || around
-    }
-}
-
 /// The finding of a transition that comes unasked, and lets go of somebody who may have been made safe meanwhile.
 fn unasked(deployment: &Deployment, chart: &Chart, edge: EdgeId, lets_go: &LetsGo) -> Option<Finding> {
-    let (by, raised, safety) = raised_by(chart, edge).find_map(|site| {
-        let (raised, safeties) = (site.name, lets_go.get(&site.name)?);
-        let unheard = |event: &&EventName| !is_heard(chart, edge, **event, lets_go);
-        let by_itself = || Some((by(deployment, chart, edge)?, *safeties.iter().find(unheard)?));
+    let (by, raised, stop) = raised_by(chart, edge).find_map(|site| {
+        let (raised, stops) = (site.name, lets_go.get(&site.name)?);
+        let unheard = |stop: &&Stop| !is_heard(chart, edge, stop, lets_go);
+        let by_itself = || Some((by(deployment, chart, edge)?, stops.iter().find(unheard)?));
         // It comes of the stop itself.
-        let at_once = |event: &&EventName| chart.triggers(edge).is_some_and(|all| all.contains(&chart.event(**event)));
-        let at_once = safeties.iter().find(at_once).map(|safety| (format!("`{safety}`"), *safety));
-        let (by, safety) = at_once.or_else(by_itself)?;
-        Some((by, raised, safety))
+        let is_it = |event: &&EventName| chart.triggers(edge).is_some_and(|all| all.contains(&chart.event(**event)));
+        let at_once = stops.iter().find_map(|stop| Some((format!("`{}`", stop.heard.iter().find(is_it)?), stop)));
+        let (by, stop) = at_once.or_else(by_itself)?;
+        Some((by, raised, stop))
     })?;
     Some(finding(
         deployment,
         chart,
         edge,
         &format!("{by} leads"),
-        (&format!("and `{raised}` is raised on that way"), safety),
+        (&format!("and `{raised}` is raised on that way"), stop),
     ))
 }
 
@@ -172,30 +125,26 @@ fn leading_there(deployment: &Deployment, chart: &Chart, lets_go: &LetsGo) -> Fi
                 continue;
             }
             open.push((*before, raised));
-            if let Some(safety) = lets_go[&raised].iter().find(|event| !is_heard(chart, *before, **event, lets_go)) {
+            if let Some(stop) = lets_go[&raised].iter().find(|stop| !is_heard(chart, *before, stop, lets_go)) {
                 let how = format!("and by itself on to where `{raised}` is raised");
-                findings.push(finding(deployment, chart, *before, &format!("{by} leads"), (&how, *safety)));
+                findings.push(finding(deployment, chart, *before, &format!("{by} leads"), (&how, stop)));
             }
         }
     }
     findings
 }
 
-fn finding(
-    deployment: &Deployment,
-    chart: &Chart,
-    edge: EdgeId,
-    leads: &str,
-    (how, safety): (&str, EventName),
-) -> Finding {
+fn finding(deployment: &Deployment, chart: &Chart, edge: EdgeId, leads: &str, (how, stop): (&str, &Stop)) -> Finding {
     let (source, target) = chart.ends(edge);
     let message = format!(
-        "{leads} from `{}` to `{}`, {how}: what `{safety}` has made safe there meanwhile is let go, and nobody said that the emergency is over",
+        "{leads} from `{}` to `{}`, {how}: what `{}` has made safe there meanwhile is let go, and nobody said that the emergency is over",
         chart.fqn(source),
-        chart.fqn(target)
+        chart.fqn(target),
+        stop.event
     );
     let help = format!(
-        "hear `{safety}` in `{}`, and go to a state from which an event of people leads on, such as `{}`",
+        "{} in `{}`, and go to a state from which an event of people leads on, such as `{}`",
+        stop.hear(),
         chart.fqn(source),
         deployment.shutdown.event
     );
@@ -223,11 +172,13 @@ fn by(deployment: &Deployment, chart: &Chart, edge: EdgeId) -> Option<String> {
     triggers.iter().find(comes_by_itself).map(|event| format!("`{}`", chart.event_text(*event)))
 }
 
-/// Whether an event of safety is heard wherever a transition may begin, leads away from there, and lets go of nothing itself.
-fn is_heard(chart: &Chart, edge: EdgeId, safety: EventName, lets_go: &LetsGo) -> bool {
-    let (source, event) = (chart.ends(edge).0, chart.event(safety));
+/// Whether a stop is heard wherever a transition may begin, leads away from there, and lets go of nothing itself.
+fn is_heard(chart: &Chart, edge: EdgeId, stop: &Stop, lets_go: &LetsGo) -> bool {
+    let source = chart.ends(edge).0;
+    let events: Vec<EventId> =
+        stop.heard.iter().map(|event| chart.event(*event)).filter(|event| *event != EventId::OTHER).collect();
     let leads_away = |other: &EdgeId| {
-        chart.triggers(*other).is_some_and(|all| all.contains(&event))
+        chart.triggers(*other).is_some_and(|all| events.iter().any(|event| all.contains(event)))
             && !chart.is_inside(chart.ends(*other).1, source)
             && !raised_by(chart, *other).any(|site| lets_go.contains_key(&site.name))
     };

@@ -5,6 +5,7 @@
 //! failed.
 
 use super::coordinator::{ask_of, edges, place};
+use super::taken::enters;
 use crate::model::codes::COORD_SAFE_LEFT;
 use crate::model::{Ask, ConfigId, Deployment, EventName, Finding, Findings, Origin, Verdict};
 use crate::statechart::{Chart, EdgeId, EventId, NodeId, NodeKind, RaiseMoment, RaiseSite};
@@ -91,13 +92,10 @@ fn ways_end_safe(chart: &Chart, edge: EdgeId, asks: &dyn Fn(NodeId) -> bool) -> 
         if !seen.insert(edge) {
             continue;
         }
-        let (_, target) = chart.ends(edge);
-        let stays = chart.least_common_ancestor(edge);
-        let mut entered =
-            std::iter::successors(Some(target), |node| chart.parent(*node)).take_while(|node| *node != stays);
-        if entered.any(asks) {
+        if enters(chart, edge).any(asks) {
             continue;
         }
+        let target = chart.ends(edge).1;
         match chart.kind(target) {
             // The way into a composite state is one to its connector `initial`.
             NodeKind::Leaf | NodeKind::Composite => return false,

@@ -29,7 +29,10 @@ pub fn check(deployment: &Deployment, universe: &Universe) -> Findings {
     for (i, reaction) in deployment.reactions.iter().enumerate() {
         let mut wrong = step(&reaction.after, reaction.origin, universe);
         if universe.of(reaction.component).is_empty() {
-            wrong.push(universe.unknown_anywhere(reaction.component, reaction.origin));
+            let unknown = universe.unknown_anywhere(reaction.component, reaction.origin);
+            // Mostly it is the one of the step.
+            let is_told = wrong.iter().any(|told| told.message == unknown.message);
+            wrong.extend((!is_told).then_some(unknown));
         }
         findings.extend(wrong.into_iter().map(|finding| finding.path(format!("simulated.reactions[{i}]"))));
     }

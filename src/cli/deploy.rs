@@ -19,7 +19,7 @@ use crate::session::kept::Leave;
 use crate::session::place;
 use crate::session::service::SessionService;
 use crate::session::socket::{ControlSocket, SocketError};
-use crate::session::{Command, Ended, NotUp, Session, Stage, Unanswered};
+use crate::session::{Command, Ended, Happening, NotUp, Session, Stage, Unanswered};
 use crate::time::{Clock, lock};
 use serde_json::json;
 use std::panic::resume_unwind;
@@ -29,7 +29,8 @@ use std::sync::{Arc, Mutex};
 ///
 /// Everything is checked first. Ctrl-C (SIGTERM, SIGHUP, SIGQUIT) stops it, also while it comes up: the coordinator leads down;
 /// where it does not, what is in force is taken back, then everything is removed by force. A second Ctrl-C begins with force;
-/// a third ends at once and asks the components nothing more. A bring-up that fails is stopped in the same way.
+/// a third ends at once and asks the components nothing more. A bring-up that fails is stopped in the same way. While something
+/// safe is in force, the end of the terminal (SIGHUP) stops nothing.
 ///
 /// Exit status: 0 shut down by its coordinator; 1 refused, or it did not come up; 4 shut down without its coordinator, by force,
 /// or incompletely.
@@ -263,7 +264,21 @@ fn watch(
         let session = Arc::downgrade(session);
         move || session.upgrade().is_some_and(|session| session.waits_to_be_forced())
     };
-    SignalWatch::start(in_background, stop, held, leave).map_err(unwatched)
+    let goes_on = {
+        let session = Arc::downgrade(session);
+        move || in_background || session.upgrade().is_some_and(|session| stays_for(&session))
+    };
+    SignalWatch::start(goes_on, stop, held, leave).map_err(unwatched)
+}
+
+/// The terminal is gone. In an emergency nobody asks for a motion with that: a connection that breaks is none to lead down for.
+fn stays_for(session: &Session) -> bool {
+    let stays = session.in_emergency();
+    if stays {
+        let note = "the terminal is gone, and something safe is in force: nothing moves for that, and it goes on without one; `davit shutdown` leads it down";
+        session.hub().note(Happening::Noted { note: note.to_owned() });
+    }
+    stays
 }
 
 /// Signals cannot be watched.

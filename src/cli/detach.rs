@@ -54,7 +54,7 @@ pub fn run(context: &CommandContext) -> CommandResult {
             }
         };
         SignalWatch::start(
-            true,
+            || true,
             move |_| {
                 left(lock(&passed).signal());
             },

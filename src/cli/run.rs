@@ -111,7 +111,7 @@ impl Run for Args {
                 super::deploy::leave(&leaving);
                 left.finish();
             };
-            SignalWatch::start(false, stop, held, leave).map_err(super::deploy::unwatched)?
+            SignalWatch::start(|| false, stop, held, leave).map_err(super::deploy::unwatched)?
         };
         let end = script::run(
             &self.script,

@@ -76,13 +76,13 @@ impl SignalSeen {
 impl SignalWatch {
     /// At the first signal calls `stop(false)`, at the second `stop(true)`: by force; and again at each that comes while it is `held`
     /// until somebody asks for that. The third is for when even that does not come to an end: it calls `leave` and ends the process with [`Exit::Forced`]; nothing more is asked of the components, and
-    /// what the process holds goes with it. With `detached` the end of the terminal (SIGHUP) is no signal. What whoever has
+    /// what the process holds goes with it. Where it `goes_on` without a terminal the end of that (SIGHUP) is no signal. What whoever has
     /// started the process had it ignore (`nohup`, a shell without a terminal for what runs beside it) stays ignored.
     ///
     /// # Errors
     /// When the operating system does not let signals be watched.
     pub fn start(
-        detached: bool,
+        goes_on: impl Fn() -> bool + Send + 'static,
         stop: impl Fn(bool) + Send + 'static,
         held: impl Fn() -> bool + Send + 'static,
         leave: impl FnOnce() + Send + 'static,
@@ -100,7 +100,7 @@ impl SignalWatch {
                     last_words::say(|| output::error(STAYS_AWAKE));
                     continue;
                 }
-                if signal == SIGHUP && detached {
+                if signal == SIGHUP && goes_on() {
                     continue;
                 }
                 match seen.asks(signal, clock.now(), held()) {

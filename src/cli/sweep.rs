@@ -69,7 +69,7 @@ impl Run for Args {
         let stop = Arc::new(AtomicBool::new(false));
         let watch = {
             let stop = stop.clone();
-            SignalWatch::start(false, move |_| stop.store(true, Ordering::Relaxed), || false, || {})
+            SignalWatch::start(|| false, move |_| stop.store(true, Ordering::Relaxed), || false, || {})
                 .map_err(super::deploy::unwatched)?
         };
         let sweeping = Sweeping {

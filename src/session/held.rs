@@ -6,25 +6,36 @@ use super::hub::Hub;
 use super::{Session, Unanswered};
 use crate::configurator::{ConfiguratorHandle, FrameView, Requester};
 use crate::limits;
-use crate::model::{ConfigId, Ident};
-use crate::time::{Clock, Time};
+use crate::model::{ConfigId, Deployment, EventName, Ident};
+use crate::time::{Clock, Time, lock};
 use rustc_hash::FxHashSet;
+use std::sync::Mutex;
 use std::sync::atomic::Ordering;
 
 impl Session {
+    /// Whether something safe could hold it, and somebody is there to decide how to go on then.
+    pub(super) fn may_be_held(&self) -> bool {
+        self.attended.load(Ordering::Relaxed) && self.has_safe()
+    }
+
     /// Whether a safe configuration is in force that came since then, or has been asked for, and somebody is there to decide how to go on.
     pub(super) fn waits_for_people(&self, began: Time) -> Result<bool, Unanswered> {
-        if !self.attended.load(Ordering::Relaxed) || !self.has_safe() {
+        if !self.may_be_held() {
             return Ok(false);
         }
         let is_safe = |id: ConfigId| self.is_safe(id);
         Ok(self.hub().applies(is_safe) || holds(&self.frames()?, is_safe, None, began))
     }
 
+    /// Whether something safe is in force, or has been asked for; while nobody knows it is as if it were.
+    pub fn in_emergency(&self) -> bool {
+        self.waits_for_people(Time::default()).unwrap_or(true)
+    }
+
     /// The same of a bring-up that has failed: what a coordinator makes safe since that failed, and nobody has stopped anything, is its own way to
     /// fail.
     pub(super) fn fails_in_emergency(&self, began: Time) -> Result<bool, Unanswered> {
-        if self.is_alarmed(began) || !self.attended.load(Ordering::Relaxed) || !self.has_safe() {
+        if self.junction().alarms.came_since(began) || !self.may_be_held() {
             return self.waits_for_people(began);
         }
         let by_people = |frame: &FrameView| !matches!(frame.by, Requester::Coordinator(_));
@@ -32,22 +43,94 @@ impl Session {
         Ok(self.frames()?.iter().any(|frame| safe(frame) && by_people(frame)))
     }
 
-    /// Whether an event of safety has come since then.
-    pub(super) fn is_alarmed(&self, began: Time) -> bool {
-        self.junction().alarmed_since(began)
+    /// The events from outside that the coordinator hears where it is that has made something safe (nobody's: any coordinator), but for those that
+    /// make it safe, and end it.
+    fn lets_go(&self, by: Requester) -> Vec<EventName> {
+        let ends = self.deployment().shutdown.event;
+        let leads_on = |event: &EventName| {
+            *event != ends && !self.junction().alarms.is_one(*event) && self.may_raise(event.as_str()).is_ok()
+        };
+        let hears = |event: &EventName| self.who_hears(*event, &[]).any(|part| may_let_go(by, part));
+        self.events().into_iter().filter(leads_on).filter(hears).collect()
     }
 
     /// What keeps it from coming up, of these frames, before people decide.
     pub(super) fn held_coming_up(&self, frames: &[FrameView]) -> Option<StandsStill> {
         let held = self.coming_up_held.load(Ordering::Relaxed);
         let safe = frames.iter().find(|frame| held && self.is_safe(frame.configuration))?;
-        let leads_on = "an event that its coordinator hears leads on, `davit shutdown` leads it down".to_owned();
+        let heard = self.lets_go(safe.by);
+        let leads_on = match heard.len() {
+            0 => "an event that its coordinator hears leads on".to_owned(),
+            _ => format!("{} leads on", one_of(&heard)),
+        };
+        let leads_on = format!("{leads_on}, `davit shutdown` leads it down");
         Some(StandsStill { safe: safe.configuration.to_string(), since: safe.at.as_secs_f64(), leads_on })
     }
+}
 
-    /// Whether every coordinator has done what it was to do by what came: what it asks for then has been asked for.
-    pub(super) fn has_reacted(&self) -> bool {
-        self.parts().iter().all(|part| part.coordinator.is_settled())
+/// Whether a coordinator may let go of what somebody has made safe: of several the one that has it in force lets it go, or none does.
+pub(super) fn may_let_go(by: Requester, part: Ident) -> bool {
+    match by {
+        Requester::Coordinator(name) => name.as_str() == part.as_str(),
+        Requester::Operator | Requester::Safety => true,
+    }
+}
+
+/// The first of several events that may be raised, in words.
+fn one_of(events: &[EventName]) -> String {
+    let named = events.iter().take(limits::EVENTS_NAMED).map(|event| format!("`davit event {event}`"));
+    named.collect::<Vec<_>>().join(" or ")
+}
+
+/// Events of safety, those of a deployment and those of its subsystems, and when a coordinator has taken one up last.
+#[derive(Debug, Default)]
+pub(super) struct Alarms {
+    events: FxHashSet<EventName>,
+    last: Mutex<Option<Time>>,
+}
+
+impl Alarms {
+    /// Those of a deployment.
+    pub fn of(deployment: &Deployment) -> Self {
+        let mut events: FxHashSet<EventName> = deployment.safety.iter().map(|(event, _)| *event).collect();
+        for (path, subsystem) in deployment.all_subsystems() {
+            events.extend(subsystem.own.safety.iter().map(|(event, _)| event.within(path)));
+        }
+        Self { events, last: Mutex::default() }
+    }
+
+    /// Whether an event is one.
+    pub fn is_one(&self, event: EventName) -> bool {
+        self.events.contains(&event)
+    }
+
+    /// A coordinator takes an event up; it may be one.
+    pub fn hear(&self, event: EventName, now: impl FnOnce() -> Time) {
+        if self.is_one(event) {
+            *lock(&self.last) = Some(now());
+        }
+    }
+
+    /// Whether one has come since then.
+    pub fn came_since(&self, began: Time) -> bool {
+        lock(&self.last).is_some_and(|at| at >= began)
+    }
+}
+
+/// A moment from which something is to be let go unasked, where something safe may hold it: what comes at that very moment is heard first, and done
+/// what it leads to.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct LastMoment(pub Time);
+
+impl LastMoment {
+    /// Whether that is over.
+    pub fn is_over(self, now: Time, has_reacted: impl FnOnce() -> bool) -> bool {
+        now >= self.0 + limits::LAST_LOOK && (has_reacted() || now >= self.0 + limits::VIEW)
+    }
+
+    /// When it is looked at next.
+    pub fn next_look(self, now: Time) -> Time {
+        if now < self.0 { self.0 } else { (self.0 + limits::LAST_LOOK).max(now + limits::LAST_LOOK) }
     }
 }
 
@@ -59,6 +142,11 @@ impl SafeOnes {
     /// Those.
     pub fn new(ids: impl IntoIterator<Item = ConfigId>) -> Self {
         Self(ids.into_iter().collect())
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
     }
 
     /// The frames in force, to be asked about several subsystems; none: nobody answers.

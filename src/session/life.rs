@@ -1,17 +1,15 @@
-//! The life of a deployment: brought up, served, down (semantics: *Stopping*). How it is stopped: [`stopping`](super::stopping).
+//! The life of a deployment: brought up ([`bring_up`](super::bring_up)), served, down (semantics: *Stopping*). How it is stopped:
+//! [`stopping`](super::stopping).
 
 use super::log::{Happening, Phase};
 use super::stages::Stage;
-use super::{Command, Session, Unanswered};
-use crate::limits;
-use crate::model::{Ident, Snapshot};
+use super::{Command, Session};
+use crate::model::Snapshot;
 use crate::time::Time;
 use crate::time::clock::panic_text;
 use serde::{Deserialize, Serialize};
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::Ordering;
-use std::time::Duration;
 
 /// How a deployment ended.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -60,122 +58,6 @@ pub struct NotUp {
 }
 
 impl Session {
-    /// Raises the deployment's event and waits until it is *up*: the named state is active and every request raised so
-    /// far has been answered.
-    ///
-    /// # Errors
-    /// [`NotUp`] when a state listed under `deploy.failed` became active, when it took too long, or when a command to
-    /// shut down came; then it has been stopped.
-    pub fn bring_up(&self) -> Result<(), NotUp> {
-        let hub = self.hub();
-        let bring_up = &self.deployment().deploy;
-        let start = self.clock().now();
-        let mut deadline = start + bring_up.within;
-        let began = hub.heard();
-        hub.set_phase(Phase::Deploying);
-        // Who does not hear it yet, while what was asked for at the beginning is not answered, is told once more then.
-        let mut ticket = match self.offer_watched(bring_up.event, "deployment") {
-            Ok(offered) => Some(offered.ticket),
-            Err(refused) => {
-                hub.note(Happening::Noted { note: format!("`{}` was not delivered: {refused}", bring_up.event) });
-                None
-            }
-        };
-        let (mut force, mut unanswered, mut told, mut failed_told, mut held) = (false, false, false, false, false);
-        let why = loop {
-            if let Some(Command::Shutdown { force: by_force }) = self.pending_command() {
-                force = by_force;
-                break (format!("interrupted while deploying `{}`", self.deployment().name), true);
-            }
-            if !self.leads() {
-                break ("a coordinator has ended".to_owned(), false);
-            }
-            // Stopped in an emergency: what stopping it would move, nobody has asked for.
-            if let Some(state) = self.failed_state().filter(|_| !self.is_alarmed(start) || self.has_reacted()) {
-                match self.fails_in_emergency(start) {
-                    Ok(true) => {
-                        unanswered = false;
-                        if !std::mem::replace(&mut failed_told, true) {
-                            let why = format!("it does not come up, since the coordinator is in `{state}`");
-                            self.tell_held(&why, "when that is let go it is led down");
-                        }
-                    }
-                    // It may be one: asked once more, before anything moves.
-                    Err(Unanswered) if !std::mem::replace(&mut unanswered, true) => continue,
-                    _ => break (format!("the coordinator is in `{state}`"), false),
-                }
-            }
-            if self.is_up() {
-                self.coming_up_held.store(false, Ordering::Relaxed);
-                ticket.into_iter().for_each(|ticket| hub.forget(ticket));
-                hub.set_phase(Phase::Up);
-                return Ok(());
-            }
-            if let Some((heard, of)) = ticket.and_then(|of| Some((hub.who_heard(of)?, of))).filter(|_| self.is_still())
-            {
-                hub.forget(of);
-                ticket = None;
-                let unheard: Vec<Ident> = self.who_hears(bring_up.event, &heard).collect();
-                if !unheard.is_empty() && self.offer_to(bring_up.event, &unheard, "deployment").is_ok() {
-                    continue;
-                }
-            }
-            let now = self.clock().now();
-            // What came at the very end of its time is to be heard: it may be an emergency.
-            let heard = !self.has_safe()
-                || now >= deadline + limits::LAST_LOOK && (self.has_reacted() || now >= deadline + limits::VIEW);
-            if now >= deadline && heard {
-                match self.waits_for_people(start) {
-                    Ok(true) => {
-                        (held, deadline) = (true, now + bring_up.within.min(limits::HELD_LOOK));
-                        if !std::mem::replace(&mut told, true) {
-                            let why = format!("not up after {} s", now.since(start).as_secs_f64().round());
-                            self.tell_held(&why, "an event that its coordinator hears leads on");
-                        }
-                    }
-                    // Let go of, it has its time anew.
-                    Ok(false) if std::mem::take(&mut held) => deadline = now + bring_up.within,
-                    Err(Unanswered) if !std::mem::replace(&mut unanswered, true) => deadline = now + bring_up.within,
-                    _ => {}
-                }
-            }
-            if now >= deadline && heard {
-                let waiting = hub.outstanding();
-                break (
-                    format!(
-                        "not up after {} s: {}{}",
-                        bring_up.within.as_secs_f64(),
-                        hub.whereabouts(),
-                        if waiting.is_empty() {
-                            String::new()
-                        } else {
-                            format!(", waiting for {}", waiting.join(", "))
-                        }
-                    ),
-                    false,
-                );
-            }
-            self.tell_slow();
-            let looks = [Duration::ZERO, limits::LAST_LOOK, limits::VIEW].map(|behind| deadline + behind);
-            let looks = looks.into_iter().find(|look| *look > now).unwrap_or(deadline);
-            hub.changed.wait(self.next_look(looks));
-        };
-        self.coming_up_held.store(false, Ordering::Relaxed);
-        ticket.into_iter().for_each(|ticket| hub.forget(ticket));
-        let reasons = self.failures_since(began);
-        let ended = self.stop(force, true);
-        Err(NotUp { why: why.0, reasons, interrupted: why.1, ended })
-    }
-
-    /// It does not come up since something safe came, and nothing is stopped before people ask for it.
-    fn tell_held(&self, why: &str, leads_on: &str) {
-        self.coming_up_held.store(true, Ordering::Relaxed);
-        let note = format!(
-            "{why}, and something safe holds it: {leads_on} (`davit status` says where it is), `davit shutdown` leads it down"
-        );
-        self.hub().note(Happening::Noted { note });
-    }
-
     /// Waits until somebody commands the end. A deployment that breaks meanwhile stays: its coordinator decides. One whose
     /// coordinator has ended is led by nobody: that is the end too.
     pub fn serve(&self) -> Command {

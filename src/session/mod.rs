@@ -4,6 +4,7 @@
 //! other, and its answers become events. The thread that calls [`Session::bring_up`], [`Session::serve`] and
 //! [`Session::take_down`] drives the deployment's life; everybody else only leaves requests and commands.
 
+mod bring_up;
 pub mod carried;
 pub mod client;
 mod connection;

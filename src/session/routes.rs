@@ -1,6 +1,7 @@
 //! The ways between coordinator, configurator and platform: names raised become requests, answers and reports become
 //! events. Called in the threads of those who raise; nothing here waits.
 
+use super::held::Alarms;
 use super::hub::{Hub, Meaning};
 use super::log::{Happening, LoggedAnswer, StepTime};
 use super::raising::make_safe;
@@ -11,8 +12,8 @@ use crate::coordinator::{ChartTrouble, Class, CoordinatorHandle, Delivered, Inco
 use crate::model::{Ask, Deployment, EventName, FAULTED, Ident, Precedence, RequestId, Verdict};
 use crate::platform::PlatformEvent;
 use crate::statechart::{Chart, EventId, FunctionOutput, NodeId, Raised};
-use crate::time::{Time, lock};
-use rustc_hash::{FxHashMap, FxHashSet};
+use crate::time::lock;
+use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, Weak};
@@ -42,9 +43,7 @@ pub(super) struct Junction {
     pub has_parent: AtomicBool,
     /// Nobody drives it any more.
     closed: AtomicBool,
-    /// Events of safety, its own and those of its subsystems, and when one was taken up last.
-    alarms: FxHashSet<EventName>,
-    alarmed: Mutex<Option<Time>>,
+    pub alarms: Alarms,
     /// Held while an event is given to several coordinators: what one of them tells the others of it comes behind it everywhere.
     giving: Mutex<()>,
 }
@@ -55,16 +54,13 @@ impl Junction {
         let urgent = deployment.urgent().map(|event| (event, deployment.precedence(event))).collect();
         let ends = Some((deployment.deploy.event, deployment.shutdown.event));
         let leaving = deployment.interface.leaving.map(|leaving| (leaving.says, leaving.until));
-        let mut alarms: FxHashSet<EventName> = deployment.safety.iter().map(|(event, _)| *event).collect();
-        for (path, subsystem) in deployment.all_subsystems() {
-            alarms.extend(subsystem.own.safety.iter().map(|(event, _)| event.within(path)));
-        }
+        let alarms = Alarms::of(deployment);
         Self { urgent, ends, subsystems: Some(subsystems), leaving, alarms, ..Self::default() }
     }
 
-    /// Whether a coordinator has taken up an event of safety since then.
-    pub fn alarmed_since(&self, began: Time) -> bool {
-        lock(&self.alarmed).is_some_and(|at| at >= began)
+    /// Whether every coordinator has done what it was to do by what came: what it asks for then has been asked for.
+    pub fn has_reacted(&self) -> bool {
+        lock(&self.coordinators).iter().all(|(_, coordinator)| coordinator.is_settled())
     }
 
     /// Its subsystems, if it has any.
@@ -228,9 +224,7 @@ impl Listener for ToConfigurator {
 
     fn delivers(&mut self, event: EventName) {
         let Some(junction) = self.junction.upgrade() else { return };
-        if junction.alarms.contains(&event) {
-            *lock(&junction.alarmed) = Some(self.hub.now());
-        }
+        junction.alarms.hear(event, || self.hub.now());
         self.begins = junction.begins(event);
         self.led = junction.subsystems().and_then(|subsystems| subsystems.takes_up(self.name, event));
         if let Some(configurator) = self.configurator() {

@@ -1,6 +1,7 @@
 //! Stopping, stage by stage (semantics: *Stopping*): what [`stages`](super::stages) decides is carried out.
 
 use super::halt::StandsStill;
+use super::held::may_let_go;
 use super::life::{Ended, UNSEEN, survived};
 use super::log::{Happening, Phase};
 use super::raising::make_safe;
@@ -379,12 +380,7 @@ impl Session {
         let frame = frames.iter().find(holds).filter(|_| people)?;
         let force = "`davit shutdown --force` takes everything away by force";
         let shutdown = self.deployment().shutdown.event;
-        // Of several coordinators the one that has it in force lets it go, or none does.
-        let lets_go = |part: Ident| match frame.by {
-            Requester::Coordinator(name) => name.as_str() == part.as_str(),
-            Requester::Operator | Requester::Safety => true,
-        };
-        let hears = |event: EventName| self.who_hears(event, &[]).any(lets_go);
+        let hears = |event: EventName| self.who_hears(event, &[]).any(|part| may_let_go(frame.by, part));
         let safety = self.deployment().safety.iter().map(|(event, _)| *event).find(|event| hears(*event));
         // What ends a subsystem comes from those around it.
         let of = |name: Ident| self.parts().iter().find(|part| part.name == name).and_then(|part| part.of);

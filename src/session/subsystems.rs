@@ -1,6 +1,6 @@
 //! The subsystems of a deployment that runs (semantics: *Composition*): who hears what, and what a parent is told without anybody writing it.
 
-use super::held::SafeOnes;
+use super::held::{LastMoment, SafeOnes};
 use super::hub::Hub;
 use super::log::{Happening, Phase, SubsystemStatus};
 use super::routes::Junction;
@@ -395,7 +395,9 @@ impl Subsystems {
                 // One that is over meanwhile is looked at at once.
                 let of = |life: &SubsystemLife| life.until().filter(|_| !life.is_late);
                 let next = lock(&own.lives).iter().filter_map(of).min();
-                own.wake.wait(next.unwrap_or(Time::NEVER));
+                let look =
+                    |over: Time| if own.safe.is_empty() { over } else { LastMoment(over).next_look(own.clock.now()) };
+                own.wake.wait(next.map_or(Time::NEVER, look));
                 let Some(junction) = junction.upgrade() else { return };
                 if junction.is_closed() {
                     return;
@@ -410,7 +412,10 @@ impl Subsystems {
     /// they let go.
     fn times_are_over(&self, hub: &Hub, junction: &Junction) {
         let now = self.clock.now();
-        let over = |life: &SubsystemLife| life.until().filter(|until| !life.is_late && *until <= now);
+        let is_over = |until: Time| {
+            if self.safe.is_empty() { now >= until } else { LastMoment(until).is_over(now, || junction.has_reacted()) }
+        };
+        let over = |life: &SubsystemLife| life.until().filter(|until| !life.is_late && is_over(*until));
         if !lock(&self.lives).iter().any(|life| over(life).is_some()) {
             return;
         }

@@ -87,15 +87,25 @@ fn hall() -> Demo {
     demo
 }
 
+/// The conveyor tells that it is stopped, wherever it is.
+fn tells(demo: &Demo) {
+    demo.replace("conveyor.yaml", "safety:", "emits: [e_stopped]\nsafety:");
+    for from in ["up", "failed", "down", "left"] {
+        let stop = format!("{{ src: {from}, tgt: held, events: [e_stop]");
+        demo.replace("coordinator.yaml", &format!("{stop} }}"), &format!("{stop}, effect: e_stopped }}"));
+    }
+}
+
 /// What the help of the finding says; where the conveyor has not been begun nothing holds it, and nobody is waited for.
 fn hears(demo: &Demo) {
+    tells(demo);
     for (from, to) in [
         ("    removing: { entry", "    stopped: {}\n    early: { entry: light.undo }\n    removing: { entry"),
         ("{ src: making, tgt: dimming", "{ src: making, tgt: early"),
         ("{ src: lighting, tgt: dimming", "{ src: lighting, tgt: early"),
         (
             "    - { src: ending, tgt: removing",
-            "    - { src: dimming, tgt: stopped, events: e_stop }
+            "    - { src: dimming, tgt: stopped, events: [e_stop, belt/e_stopped] }
     - { src: stopped, tgt: dimming, events: e_close }
     - { src: early, tgt: removing, events: [light.undone, light.undo.failed, light.undo.broken] }
     - { src: ending, tgt: removing",
@@ -105,11 +115,14 @@ fn hears(demo: &Demo) {
     }
 }
 
-/// The messages of `coord::safe_left`.
-fn told(demo: &Demo) -> Vec<String> {
+/// The messages of `coord::safe_left`, and what they advise.
+fn told_of(demo: &Demo, key: &str) -> Vec<String> {
     let checked = demo.run(&["check", "hall.yaml", "--json"]).json();
     let all = checked["findings"].as_array().unwrap().iter().filter(|one| one["code"] == "coord::safe_left");
-    all.map(|one: &Json| one["message"].as_str().unwrap().to_owned()).collect()
+    all.map(|one: &Json| one[key].as_str().unwrap().to_owned()).collect()
+}
+fn told(demo: &Demo) -> Vec<String> {
+    told_of(demo, "message")
 }
 
 #[test]
@@ -177,10 +190,9 @@ fn who_ends_a_subsystem_by_an_answer_hears_what_stops_it() {
     demo.write("line.lua", LINE_COORDINATOR);
     demo.write("none.yaml", "configurations: {}\n");
     assert!(told(&demo).iter().any(|one| one.contains("`belt/e_end`")), "{}", demo.run(&["check", "hall.yaml"]).err);
-    // By people it is what they ask for; and so it is where the stop is given to nobody below, or ends nothing there.
+    // By people it is what they ask for; and so it is where it ends nothing below.
     for (file, from, to) in [
         ("hall_coordinator.yaml", "[light.undone, light.undo.failed, light.undo.broken]", "e_go"),
-        ("hall.yaml", "safety: e_stop\n", ""),
         ("coordinator.yaml", "    - { src: held, tgt: down, events: [e_end] }\n", ""),
     ] {
         let demo = hall();
@@ -209,6 +221,72 @@ fn who_follows_the_advice_keeps_it_until_people_ask() {
     let told = said(&demo);
     assert!(told.contains(&"belt/hold".to_owned()), "{told:?}");
     assert_eq!(told.last().unwrap(), "shut 0");
+}
+
+/// A stop of the subsystem alone is heard by its parent where that is told of it, and in no other way.
+#[test]
+fn who_ends_a_subsystem_by_an_answer_is_told_where_it_is_stopped_alone() {
+    let alone = |demo: &Demo| {
+        let found = told(demo);
+        assert!(found.len() == 1 && found[0].contains("what `belt/e_stop` has made safe"), "{found:?}");
+        told_of(demo, "help").remove(0)
+    };
+    // Given on or not; where nothing, or not always something, is told; and where that is not heard.
+    let demo = hall();
+    demo.replace("hall.yaml", "safety: e_stop\n", "");
+    assert!(alone(&demo).contains("let the subsystem emit an event wherever it takes `belt/e_stop` up"));
+    let demo = hall();
+    hears(&demo);
+    demo.replace(
+        "coordinator.yaml",
+        "{ src: failed, tgt: held, events: [e_stop], effect: e_stopped }",
+        "{ src: failed, tgt: held, events: [e_stop] }",
+    );
+    assert!(alone(&demo).contains("let the subsystem emit an event"));
+    let demo = hall();
+    hears(&demo);
+    demo.replace("hall_coordinator.yaml", "[e_stop, belt/e_stopped]", "e_stop");
+    assert!(alone(&demo).contains("hear `belt/e_stopped` (by which that is told) in `root.dimming`"));
+    // One between passes it on, or does not.
+    for passes_on in [false, true] {
+        let demo = hall();
+        hears(&demo);
+        demo.replace("hall.yaml", "deployment: conveyor.yaml", "deployment: line.yaml");
+        demo.write("line.yaml", &LINE.replace("deploy:  ", "safety: e_stop\nemits: [e_stopped]\ndeploy:  "));
+        let stopped = "trans { src = 'off', tgt = 'raising', events = { 'e_start' } },";
+        let all = ["raising", "on", "failed", "ending"];
+        let passed = all.map(|from| {
+            let effect = if passes_on { ", effect = 'e_stopped'" } else { "" };
+            format!("  trans {{ src = '{from}', tgt = 'stopped', events = {{ 'inner/e_stopped' }}{effect} }},\n")
+        });
+        let own = all.map(|from| {
+            format!("  trans {{ src = '{from}', tgt = 'stopped', events = {{ 'e_stop' }}, effect = 'e_stopped' }},\n")
+        });
+        let ends = "  trans { src = 'stopped', tgt = 'ending', events = { 'e_end' } },\n";
+        let chart = LINE_COORDINATOR.replace("off = state {},", "off = state {}, stopped = state {},");
+        demo.write(
+            "line.lua",
+            &chart.replace(stopped, &format!("{stopped}\n{}{}{ends}", own.concat(), passed.concat())),
+        );
+        demo.write("none.yaml", "configurations: {}\n");
+        let found = told(&demo);
+        let inner = found.iter().any(|one| one.contains("what `belt/inner/e_stop` has made safe"));
+        assert_eq!(inner, !passes_on, "{found:?}\n{}", demo.run(&["check", "hall.yaml"]).err);
+    }
+}
+
+/// Who follows that advice keeps it until people ask, too.
+#[test]
+fn a_stop_of_the_subsystem_alone_waits_for_people() {
+    let story = "deploy('hall.yaml') wait_state('hall:open', 2) raise('e_close') wait(0.2) raise('belt/e_stop') wait(3)
+        say('held ' .. #stack())
+        raise('e_close') wait_state('hall:shut', 3) say('shut ' .. #stack())";
+    let demo = hall();
+    hears(&demo);
+    demo.write("s.lua", story);
+    let ran = demo.run(&["run", "s.lua", "--clock", "simulated", "--quiet"]);
+    assert_eq!(ran.code, 0, "{}{}", ran.out, ran.err);
+    assert_eq!(ran.out.lines().collect::<Vec<_>>(), ["held 4", "shut 0"]);
 }
 
 /// A stop that is heard where one waits, and stays there, keeps nobody from going on.

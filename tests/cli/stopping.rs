@@ -290,6 +290,24 @@ fn stopped_in_an_emergency(left_on: &str) -> (Demo, Foreground) {
     (demo, deployed)
 }
 
+/// A terminal that goes while something safe is in force asks for no motion; whoever comes next leads it down.
+#[test]
+fn a_terminal_that_goes_in_an_emergency_moves_nothing() {
+    let demo = with_an_emergency("e_stop");
+    let deployed = deploy(&demo, "out");
+    demo.until_phase("up");
+    let emergency = demo.run(&["event", "e_estop", "--wait", "calm.ok"]);
+    assert_eq!(emergency.code, 0, "{}{}", emergency.out, emergency.err);
+    for _ in 0..2 {
+        deployed.signal(libc::SIGHUP);
+        until("what is said of it", || demo.read("out").contains("the terminal is gone").then_some(()));
+    }
+    let status = demo.run(&["status", "--json"]).json();
+    assert!(status["phase"] == "up" && status["stack"].as_array().is_some_and(|all| all.len() == 2), "{status}");
+    let down = demo.run(&["shutdown"]);
+    assert_eq!((down.code, deployed.end().code()), (0, Some(0)), "{}{}", down.out, down.err);
+}
+
 /// An emergency while it is led down, with its terminal closed: who asks is told what is in force, since when, and what leads on.
 #[test]
 fn what_stands_still_after_an_emergency_says_what_it_waits_for() {

@@ -175,6 +175,76 @@ fn a_stop_in_the_last_moment_holds() {
     }
 }
 
+/// The same of another coordinator that fails at that very moment, and of a subsystem whose time is over then; and what comes behind it is
+/// late all the same.
+#[test]
+fn a_stop_at_the_very_moment_of_a_failure_holds() {
+    for (at, holds) in [(1.999, true), (2.0, true), (2.002, false)] {
+        let hall = Hall::new("conveyor.yaml", with_a_lamp);
+        let (took, not_up) = hall.bring_up(&[(at, "e_stop"), (60.0, "e_reset")]);
+        assert!(!not_up.unwrap_err().interrupted, "{at}");
+        let undone = hall.first("hold.undone");
+        assert_eq!(
+            (took >= 60.0, undone.is_none_or(|undone| undone >= 60.0)),
+            (holds, true),
+            "{at}: {took} {undone:?}"
+        );
+    }
+}
+
+#[test]
+fn a_subsystem_is_late_once_what_came_at_that_moment_is_heard() {
+    let slow = |name: &str, text: String| match name {
+        "hall.yaml" => text.replace("takes_s: 3", "takes_s: 8") + "limits: { step_timeout_s: 30 }\n",
+        _ => text,
+    };
+    for (at, holds) in [(4.999, true), (5.0, true), (5.002, false)] {
+        let hall = Hall::new("hall.yaml", slow);
+        let (_, not_up) = hall.bring_up(&[(at, "e_stop"), (60.0, "shutdown")]);
+        assert!(not_up.is_err());
+        assert_eq!(hall.first("left/failed").is_none(), holds, "{at}: {:?}", hall.first("left/failed"));
+    }
+}
+
+/// Its time begins anew when it is let go, however long it was held: it comes up two seconds after that.
+#[test]
+fn the_time_of_a_subsystem_begins_anew_when_it_is_let_go() {
+    let warming = |name: &str, text: String| {
+        match name {
+        "hall.yaml" => text.replace("takes_s: 3", "takes_s: 0.1"),
+        "coordinator.yaml" => text
+            .replace("        running: { config: slow }", "        warming: {}\n        running: { config: slow }")
+            .replace(
+                "{ src: starting, tgt: running, events: [run.ok] }",
+                "{ src: starting, tgt: warming, events: [run.ok] }\n        - { src: warming, tgt: running, events: [e_after(2)] }",
+            )
+            .replace(
+                "    down:\n",
+                "    paused:
+      config: hold
+      states: { whole: {}, in_part: {} }
+      transitions: [{ src: initial, tgt: whole }, { src: whole, tgt: in_part, events: [hold.failed, hold.broken] }]
+    down:\n",
+            )
+            .replace(
+                "    - { src: up, tgt: held, events: [e_stop] }",
+                "    - { src: up.building, tgt: held, events: [e_stop] }
+    - { src: up.starting, tgt: held, events: [e_stop] }
+    - { src: up.running, tgt: held, events: [e_stop] }
+    - { src: up.warming, tgt: paused, events: [e_stop] }
+    - { src: paused, tgt: paused, events: [e_stop] }
+    - { src: paused, tgt: up.warming, events: [e_reset] }
+    - { src: paused, tgt: down, events: [e_end] }",
+            ),
+        _ => text,
+    }
+    };
+    let hall = Hall::new("hall.yaml", warming);
+    let (took, up) = hall.bring_up(&[(1.0, "e_stop"), (9.9, "left/e_reset"), (9.9, "right/e_reset")]);
+    assert!(up.is_ok() && (11.9..12.0).contains(&took), "{took} {up:?}");
+    assert_eq!(hall.first("left/failed"), None);
+}
+
 /// What makes itself safe since its bring-up has failed is stopped as ever: nobody has stopped anything.
 #[test]
 fn to_fail_safely_is_no_emergency() {
@@ -189,10 +259,9 @@ fn to_fail_safely_is_no_emergency() {
     assert!(hall.first("hold.ok").is_some(), "it was made safe");
 }
 
-/// Another coordinator of the same file that fails meanwhile.
-#[test]
-fn another_coordinator_that_fails_ends_no_emergency() {
-    let two = |name: &str, text: String| match name {
+/// With a second coordinator, which fails after two seconds.
+fn with_a_lamp(name: &str, text: String) -> String {
+    match name {
         "conveyor.yaml" => text
             .replace("coordinator: coordinator.yaml", "coordinators: { belt: coordinator.yaml, lamp: lamp.yaml }")
             .replace(
@@ -200,8 +269,13 @@ fn another_coordinator_that_fails_ends_no_emergency() {
                 "up: [belt:running, lamp:on], failed: [belt:failed, lamp:failed]",
             ),
         _ => text,
-    };
-    let hall = Hall::new("conveyor.yaml", two);
+    }
+}
+
+/// Another coordinator of the same file that fails meanwhile.
+#[test]
+fn another_coordinator_that_fails_ends_no_emergency() {
+    let hall = Hall::new("conveyor.yaml", with_a_lamp);
     let (took, not_up) = hall.bring_up(&[(1.0, "e_stop"), (60.0, "e_reset")]);
     assert!(!not_up.unwrap_err().interrupted && took >= 60.0, "{took}");
     assert!(hall.first("hold.undone").is_some_and(|at| at >= 60.0), "{:?}", hall.first("hold.undone"));
