@@ -21,6 +21,7 @@ end
 
 -- Where it is stopped, and how one comes there from the beginning of the bring-up.
 local PLACES = {
+  { "as it is powered",        function() until_both("powering", 1) end },
   { "calibrating",             function() until_both("calibrating", 1) wait(0.06) end },
   { "unfolding",               function() until_both("unfolding", 1) wait(2) end },
   { "unsync",                  function() until_both("unsync", 6) wait(0.1) end },
@@ -36,6 +37,9 @@ local PLACES = {
   { "folding on the way back", function() until_both("unfolding", 1) wait(3) go_down() until_both("folding", 5) wait(1) end },
   { "failed on the way up",    function() until_both("unfolding", 1) wait(1) stopped() both("e_reset") until_both("deploy_failed", 1) end },
   { "taking over",             function() until_both("unfolding", 1) slow("youbot", "setControlMode") until_both("taking_over", 8) end, state = "taking_over" },
+  { "as the control starts",   function() until_both("starting", 8) end },
+  { "as the control stops",    function() until_both("copying", 20) go_down() until_both("shutting_down.stopping", 8) end },
+  { "powering off",            function() until_both("copying", 20) go_down() until_both("parking", 8) slow("youbot", "setControlMode") until_both("powering_off", 8) end, state = "powering_off" },
   { "quieting",                function() until_both("copying", 20) slow("Base_Ctrl", "stop") go_down() until_both("quieting", 1) end, state = "quieting" },
   { "holding",                 function() until_both("copying", 20) slow("youbot", "setControlMode") go_down() until_both("holding", 1) end, state = "holding" },
   { "stranded before parking", function()

@@ -3,7 +3,7 @@
 
 use super::explore::Graph;
 use super::state::Move;
-use super::stops_below::Stop;
+use super::stops_below::StopBelow;
 use crate::model::{Deployment, EventName, Ident};
 
 impl Graph<'_, '_> {
@@ -42,7 +42,7 @@ impl Graph<'_, '_> {
         let heard = deployment.subsystems.iter().map(|subsystem| {
             let events = deployment.safety.iter().map(|(event, _)| *event);
             let given = events.filter(|event| makes_safe(&subsystem.own, *event));
-            let alone = Stop::alone(subsystem).into_iter().flat_map(|stop| stop.heard);
+            let alone = StopBelow::alone(subsystem).into_iter().flat_map(|stop| stop.heard);
             (subsystem.name, given.chain(alone).collect::<Vec<_>>())
         });
         heard.filter(|(_, events)| !events.is_empty()).collect()

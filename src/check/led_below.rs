@@ -8,7 +8,7 @@
 use super::coordinator::{ask_of, edges, place};
 
 use super::led_on::{HeldSafe, held};
-use super::stops_below::{Stop, compiled, is_given_on};
+use super::stops_below::{StopBelow, compiled, is_given_on};
 use super::taken::{Taken, raised_by};
 use crate::model::codes::COORD_SAFE_LEFT;
 use crate::model::statechart::is_internal;
@@ -18,7 +18,7 @@ use rustc_hash::FxHashSet;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Events that let go of what is safe, each with the stops by which it came to be.
-type LetsGo = BTreeMap<EventName, Vec<Stop>>;
+type LetsGo = BTreeMap<EventName, Vec<StopBelow>>;
 
 /// Transitions of these coordinators by which a subsystem, or another one of them, is let go unasked.
 pub fn check(deployment: &Deployment, charts: &[&Chart]) -> Findings {
@@ -31,7 +31,7 @@ pub fn check(deployment: &Deployment, charts: &[&Chart]) -> Findings {
             for event in let_go_by(deployment, other, &below) {
                 lets_go
                     .entry(event)
-                    .or_insert_with(|| deployment.safety.iter().map(|(event, _)| Stop::given(*event)).collect());
+                    .or_insert_with(|| deployment.safety.iter().map(|(event, _)| StopBelow::given(*event)).collect());
             }
         }
         if !lets_go.is_empty() {
@@ -48,12 +48,12 @@ fn below(deployment: &Deployment, above: &BTreeSet<EventName>) -> LetsGo {
     let safety: BTreeSet<EventName> =
         deployment.safety.iter().map(|(event, _)| *event).chain(above.iter().copied()).collect();
     for subsystem in &deployment.subsystems {
-        let own = &*subsystem.own;
+        let own = subsystem.own.own_part();
         let inner = below(own, &safety);
         let charts = compiled(own);
         let events: FxHashSet<EventName> = charts.iter().flat_map(|chart| let_go_by(own, chart, &inner)).collect();
-        let given = safety.iter().copied().filter(|event| is_given_on(*event, own)).map(Stop::given);
-        let stops: Vec<Stop> = given.chain(Stop::alone(subsystem)).collect();
+        let given = safety.iter().copied().filter(|event| is_given_on(*event, own)).map(StopBelow::given);
+        let stops: Vec<StopBelow> = given.chain(StopBelow::alone(subsystem)).collect();
         let accepts = own.interface.accepts.iter().map(|(event, _)| *event);
         for event in accepts.chain([own.deploy.event, own.shutdown.event]).filter(|event| events.contains(event)) {
             all.insert(event.within(subsystem.name), stops.clone());
@@ -87,7 +87,7 @@ fn let_go_by(deployment: &Deployment, chart: &Chart, below: &LetsGo) -> FxHashSe
 fn unasked(deployment: &Deployment, chart: &Chart, edge: EdgeId, lets_go: &LetsGo) -> Option<Finding> {
     let (by, raised, stop) = raised_by(chart, edge).find_map(|site| {
         let (raised, stops) = (site.name, lets_go.get(&site.name)?);
-        let unheard = |stop: &&Stop| !is_heard(chart, edge, stop, lets_go);
+        let unheard = |stop: &&StopBelow| !is_heard(chart, edge, stop, lets_go);
         let by_itself = || Some((by(deployment, chart, edge)?, stops.iter().find(unheard)?));
         // It comes of the stop itself.
         let is_it = |event: &&EventName| chart.triggers(edge).is_some_and(|all| all.contains(&chart.event(**event)));
@@ -134,7 +134,13 @@ fn leading_there(deployment: &Deployment, chart: &Chart, lets_go: &LetsGo) -> Fi
     findings
 }
 
-fn finding(deployment: &Deployment, chart: &Chart, edge: EdgeId, leads: &str, (how, stop): (&str, &Stop)) -> Finding {
+fn finding(
+    deployment: &Deployment,
+    chart: &Chart,
+    edge: EdgeId,
+    leads: &str,
+    (how, stop): (&str, &StopBelow),
+) -> Finding {
     let (source, target) = chart.ends(edge);
     let message = format!(
         "{leads} from `{}` to `{}`, {how}: what `{}` has made safe there meanwhile is let go, and nobody said that the emergency is over",
@@ -173,7 +179,7 @@ fn by(deployment: &Deployment, chart: &Chart, edge: EdgeId) -> Option<String> {
 }
 
 /// Whether a stop is heard wherever a transition may begin, leads away from there, and lets go of nothing itself.
-fn is_heard(chart: &Chart, edge: EdgeId, stop: &Stop, lets_go: &LetsGo) -> bool {
+fn is_heard(chart: &Chart, edge: EdgeId, stop: &StopBelow, lets_go: &LetsGo) -> bool {
     let source = chart.ends(edge).0;
     let events: Vec<EventId> =
         stop.heard.iter().map(|event| chart.event(*event)).filter(|event| *event != EventId::OTHER).collect();

@@ -7,7 +7,7 @@ use crate::statechart::{Chart, EdgeId, EventId, compile};
 
 /// A stop of a subsystem.
 #[derive(Debug, Clone)]
-pub struct Stop {
+pub struct StopBelow {
     /// The event of safety, as the parent writes it.
     pub event: EventName,
     /// What the parent hears where it comes.
@@ -16,7 +16,7 @@ pub struct Stop {
     alone: bool,
 }
 
-impl Stop {
+impl StopBelow {
     /// One that comes to the parent, and is given on.
     pub fn given(event: EventName) -> Self {
         Self { event, heard: vec![event], alone: false }
@@ -24,7 +24,7 @@ impl Stop {
 
     /// Those of a subsystem alone, and of what is in it, by operators, components and monitors there.
     pub fn alone(subsystem: &Subsystem) -> Vec<Self> {
-        let own = &*subsystem.own;
+        let own = subsystem.own.own_part();
         let charts = compiled(own);
         let inside = own.subsystems.iter().flat_map(Self::alone);
         let stops = own.safety.iter().map(|(event, _)| Self::given(*event)).chain(inside);

@@ -15,8 +15,9 @@ struct ComingUp<'s> {
     session: &'s Session,
     start: Time,
     deadline: Time,
-    /// Since when a coordinator is in a state that says so.
+    /// Since when a coordinator is in a state that says so, and whether something safe was seen to hold it there.
     failed: Option<Time>,
+    failed_held: bool,
     /// Something safe has held it when its time was over.
     held: bool,
     /// The configurator has not answered whether something safe holds it, once.
@@ -109,8 +110,9 @@ impl<'s> ComingUp<'s> {
     fn new(session: &'s Session) -> Self {
         let start = session.clock().now();
         let deadline = start + session.deployment().deploy.within;
-        let (failed, held, unanswered, told_failed, told_late) = (None, false, false, false, false);
-        Self { session, start, deadline, failed, held, unanswered, told_failed, told_late }
+        let (failed, failed_held, held, unanswered) = (None, false, false, false);
+        let (told_failed, told_late) = (false, false);
+        Self { session, start, deadline, failed, failed_held, held, unanswered, told_failed, told_late }
     }
 
     /// Whether it is to be stopped since that moment has come: who may be held then is asked about that first.
@@ -127,7 +129,7 @@ impl<'s> ComingUp<'s> {
     fn failed(&mut self) -> Outlook {
         let session = self.session;
         let Some(state) = session.failed_state() else {
-            self.failed = None;
+            (self.failed, self.failed_held) = (None, false);
             return Outlook::Open;
         };
         let since = *self.failed.get_or_insert_with(|| session.clock().now());
@@ -136,7 +138,7 @@ impl<'s> ComingUp<'s> {
         }
         match session.fails_in_emergency(self.start) {
             Ok(true) => {
-                self.unanswered = false;
+                (self.unanswered, self.failed_held) = (false, true);
                 if !std::mem::replace(&mut self.told_failed, true) {
                     let why = format!("it does not come up, since the coordinator is in `{state}`");
                     session.tell_held(&why, "when that is let go it is led down");
@@ -183,7 +185,7 @@ impl<'s> ComingUp<'s> {
     fn next_look(&self) -> Time {
         let now = self.session.clock().now();
         // While something safe holds one that failed, whoever lets go of it changes something.
-        let failed = self.failed.filter(|_| !self.told_failed);
+        let failed = self.failed.filter(|_| !self.failed_held);
         failed.into_iter().chain([self.deadline]).map(|of| LastMoment(of).next_look(now)).min().unwrap_or(self.deadline)
     }
 }

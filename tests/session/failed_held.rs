@@ -206,13 +206,9 @@ fn a_subsystem_is_late_once_what_came_at_that_moment_is_heard() {
     }
 }
 
-/// Its time begins anew when it is let go, however long it was held: it comes up two seconds after that.
-#[test]
-fn the_time_of_a_subsystem_begins_anew_when_it_is_let_go() {
-    let warming = |name: &str, text: String| {
-        match name {
-        "hall.yaml" => text.replace("takes_s: 3", "takes_s: 0.1"),
-        "coordinator.yaml" => text
+/// A conveyor that warms up for two seconds, and goes on with that when it is let go.
+fn with_warming(text: &str) -> String {
+    text
             .replace("        running: { config: slow }", "        warming: {}\n        running: { config: slow }")
             .replace(
                 "{ src: starting, tgt: running, events: [run.ok] }",
@@ -235,14 +231,35 @@ fn the_time_of_a_subsystem_begins_anew_when_it_is_let_go() {
     - { src: paused, tgt: paused, events: [e_stop] }
     - { src: paused, tgt: up.warming, events: [e_reset] }
     - { src: paused, tgt: down, events: [e_end] }",
-            ),
+            )
+}
+
+/// Its time begins anew when it is let go, however long it was held: it comes up two seconds after that.
+#[test]
+fn the_time_of_a_subsystem_begins_anew_when_it_is_let_go() {
+    let warming = |name: &str, text: String| match name {
+        "hall.yaml" => text.replace("takes_s: 3", "takes_s: 0.1"),
+        "coordinator.yaml" => with_warming(&text),
         _ => text,
-    }
     };
     let hall = Hall::new("hall.yaml", warming);
     let (took, up) = hall.bring_up(&[(1.0, "e_stop"), (9.9, "left/e_reset"), (9.9, "right/e_reset")]);
     assert!(up.is_ok() && (11.9..12.0).contains(&took), "{took} {up:?}");
     assert_eq!(hall.first("left/failed"), None);
+}
+
+/// One that was held where it had failed, was let go, and fails once more, is stopped at once.
+#[test]
+fn what_fails_once_more_when_it_is_let_go_is_stopped() {
+    let again = |name: &str, text: String| match name {
+        "coordinator.yaml" => with_warming(&text),
+        "lamp.yaml" => text + "    - { src: failed, tgt: trying, events: e_again }\n",
+        _ => with_a_lamp(name, text),
+    };
+    let hall = Hall::new("conveyor.yaml", again);
+    let (took, not_up) = hall.bring_up(&[(1.0, "e_stop"), (3.0, "e_again"), (3.5, "e_reset")]);
+    assert!(hall.first("it does not come up, since the coordinator is in `failed`").is_some_and(|at| at < 2.1));
+    assert!(not_up.is_err() && hall.first("build.undone").is_some_and(|at| (5.0..5.1).contains(&at)), "{took}");
 }
 
 /// What makes itself safe since its bring-up has failed is stopped as ever: nobody has stopped anything.
