@@ -6,7 +6,6 @@
 //! there, its components or its monitors: then its parent hears what that emits of it, or nothing.
 
 use super::coordinator::{ask_of, edges, place};
-
 use super::led_on::{HeldSafe, held};
 use super::stops_below::{StopBelow, compiled, is_given_on};
 use super::taken::{Taken, raised_by};
@@ -54,6 +53,9 @@ fn below(deployment: &Deployment, above: &BTreeSet<EventName>) -> LetsGo {
         let events: FxHashSet<EventName> = charts.iter().flat_map(|chart| let_go_by(own, chart, &inner)).collect();
         let given = safety.iter().copied().filter(|event| is_given_on(*event, own)).map(StopBelow::given);
         let stops: Vec<StopBelow> = given.chain(StopBelow::alone(subsystem)).collect();
+        if stops.is_empty() {
+            continue;
+        }
         let accepts = own.interface.accepts.iter().map(|(event, _)| *event);
         for event in accepts.chain([own.deploy.event, own.shutdown.event]).filter(|event| events.contains(event)) {
             all.insert(event.within(subsystem.name), stops.clone());
