@@ -5,13 +5,13 @@
 //! Who hears that event where it waits, and goes elsewhere, waits for people from then on. A subsystem may be stopped alone, too, by somebody
 //! there, its components or its monitors: then its parent hears what that emits of it, or nothing.
 
+use super::by_itself::by;
 use super::coordinator::{ask_of, edges, place};
 use super::led_on::{HeldSafe, held};
 use super::stops_below::{StopBelow, compiled, is_given_on};
 use super::taken::{Taken, raised_by};
 use crate::model::codes::COORD_SAFE_LEFT;
-use crate::model::statechart::is_internal;
-use crate::model::{Ask, Deployment, EventName, Finding, Findings, Verdict};
+use crate::model::{Ask, Deployment, EventName, Finding, Findings};
 use crate::statechart::{Chart, EdgeId, EventId, NodeId, NodeKind, RaiseMoment, RaiseSite};
 use rustc_hash::FxHashSet;
 use std::collections::{BTreeMap, BTreeSet};
@@ -158,26 +158,6 @@ fn finding(
     );
     let finding = Finding::warning(COORD_SAFE_LEFT, message).at(chart.edge_origin(edge));
     finding.path(place(chart, RaiseMoment::Effect(edge))).help(help)
-}
-
-/// What takes a transition without anybody having said so, in words.
-fn by(deployment: &Deployment, chart: &Chart, edge: EdgeId) -> Option<String> {
-    // What leads out of a connector comes of what led into it.
-    let triggers = match chart.triggers(edge) {
-        _ if !chart.is_state(chart.ends(edge).0) => return None,
-        None | Some([]) => return Some("whatever comes next".to_owned()),
-        Some(triggers) => triggers,
-    };
-    let comes_by_itself = |event: &&EventId| {
-        let text = chart.event_text(**event);
-        let is_answer = Verdict::split(&text).is_some() && deployment.looks_like_answer(&text);
-        let is_told = text
-            .split_once('/')
-            .is_some_and(|(path, _)| deployment.subsystems.iter().any(|subsystem| subsystem.name.as_str() == path));
-        let completes = is_internal(&text);
-        chart.time_of(**event).is_some() || completes || is_answer || is_told
-    };
-    triggers.iter().find(comes_by_itself).map(|event| format!("`{}`", chart.event_text(*event)))
 }
 
 /// Whether a stop is heard wherever a transition may begin, leads away from there, and lets go of nothing itself.

@@ -1,9 +1,10 @@
 //! An emergency never leads on by itself: what is safe is in force until somebody says that it is over.
 //!
 //! A state that takes a safe configuration back when it is left must not be left by what comes without anybody: by that configuration's own
-//! answers, by time, or by whatever comes first. What was done of the emergency would be undone unasked, at the latest when part of it
+//! answers, by time, or by whatever comes first; nor, from where it is entered, by anything else that comes by itself. What was done of the emergency would be undone unasked, at the latest when part of it
 //! failed.
 
+use super::by_itself::ways_on;
 use super::coordinator::{ask_of, edges, place};
 use super::taken::enters;
 use crate::model::codes::COORD_SAFE_LEFT;
@@ -52,8 +53,10 @@ pub fn check(deployment: &Deployment, chart: &Chart) -> Findings {
     let mut findings = Findings::new();
     for held in held(deployment, chart) {
         let HeldSafe { state, id, at } = held;
+        let ways_on = ways_on(deployment, chart, state);
         for edge in edges(chart).filter(|edge| held.is_left_by(deployment, chart, *edge)) {
-            let Some(by) = unasked(chart, edge, id) else { continue };
+            let leads_on = || ways_on.iter().find(|(way, _)| *way == edge).map(|(_, by)| by.clone());
+            let Some(by) = unasked(chart, edge, id).or_else(leads_on) else { continue };
             let (_, target) = chart.ends(edge);
             let message = format!(
                 "{by} leads from `{}` to `{}`, which takes `{id}` back: nobody said that the emergency is over",

@@ -16,6 +16,7 @@ mod behind;
 mod belief;
 mod bound;
 mod broken_exports;
+mod by_itself;
 mod children;
 mod chunks;
 mod closed;

@@ -618,7 +618,8 @@ codes! {
          actuator: it is probably a slip.";
     COORD_SAFE_LEFT = "coord::safe_left", "an emergency is taken back without anybody having said so",
         "A state takes a `safe` configuration back when it is left (it is its `config`, or its `exit` undoes it), and a transition leaves it by what \
-         comes by itself: an answer of that configuration, a time, or whatever comes next; and what is entered asks for nothing safe. When a part of an \
+         comes by itself: an answer of that configuration, a time, a fault, or whatever comes next, also in several steps of which nobody asked for any; and \
+         what is entered asks for nothing safe. When a part of an \
          emergency stop fails (`stop.broken`), that undoes the part that was done: brakes open again, and nobody asked. Let an event of people lead on \
          (`e_reset`). What should be shown or told of how it ended is a transition between two states inside of the one that has the \
          configuration: that stays in force. The same where a coordinator raises what ends an emergency of a subsystem, or of another coordinator, \

@@ -366,6 +366,27 @@ fn who_lets_go_of_one_unasked_is_told() {
         "{ src: stopped, tgt: stopped, events: [e_stop, e_after(5)] }",
     );
     assert!(anew.is_empty(), "{anew:?}");
+    // A fault; and two steps of which none was asked for, but not where people have asked for the first of them.
+    let faulted = lets_go(reset, "{ src: stopped, tgt: failed, events: [e_reset, motor.faulted] }");
+    assert!(faulted.len() == 1 && faulted[0].starts_with("`motor.faulted` leads"), "{faulted:?}");
+    let in_part = "        - { src: whole, tgt: in_part, events: [stop.failed, stop.broken] }\n    down:";
+    for (first, is_told) in [("stop.ok", true), ("e_after(1)", true), ("e_looked", false)] {
+        let two = format!(
+            "        - {{ src: whole, tgt: in_part, events: [stop.failed, stop.broken] }}
+        - {{ src: in_part, tgt: ready, events: [e_looked] }}
+        - {{ src: whole, tgt: ready, events: [{first}] }}\n    down:"
+        );
+        let demo = belt();
+        demo.replace("belt/coordinator.yaml", in_part, &two);
+        demo.replace("belt/coordinator.yaml", "        in_part: {}\n", "        in_part: {}\n        ready: {}\n");
+        demo.replace(
+            "belt/coordinator.yaml",
+            reset,
+            &format!("{reset}\n    - {{ src: stopped.ready, tgt: failed, events: [e_done] }}"),
+        );
+        let told = found(&demo, "coord::safe_left");
+        assert_eq!(told.len(), usize::from(is_told), "{first}: {told:?}");
+    }
     // The help of a failure that nobody hears does not lead there.
     let demo = belt();
     demo.replace("belt/coordinator.yaml", "events: [stop.failed, stop.broken]", "events: [e_looked]");
