@@ -3,7 +3,7 @@
 use super::coordinator::{ask_of, edges};
 use super::taken::raised_by;
 use crate::model::{Ask, Deployment, EventName, Subsystem};
-use crate::statechart::{Chart, EdgeId, EventId, compile};
+use crate::statechart::{Chart, EdgeId, EventId, NodeKind, compile};
 
 /// A stop of a subsystem.
 #[derive(Debug, Clone)]
@@ -64,8 +64,10 @@ fn told(own: &Deployment, charts: &[Chart], of: &[EventName]) -> Vec<EventName> 
         let heard: Vec<EventId> = of.iter().map(|of| chart.event(*of)).filter(|of| *of != EventId::OTHER).collect();
         let takes_up = |edge: &EdgeId| {
             let (source, target) = chart.ends(*edge);
-            let comes_anew = !chart.is_inside(target, source);
-            comes_anew && chart.triggers(*edge).is_some_and(|all| heard.iter().any(|of| all.contains(of)))
+            // The way into a composite state is one to its connector `initial`.
+            let into = chart.kind(target) == NodeKind::Connector && chart.parent(target) == Some(source);
+            let once_more = target == source || into;
+            !once_more && chart.triggers(*edge).is_some_and(|all| heard.iter().any(|of| all.contains(of)))
         };
         ways.extend(edges(chart).filter(takes_up).map(|edge| {
             let raised: Vec<EventName> = raised_by(chart, edge).map(|site| site.name).collect();

@@ -385,9 +385,11 @@ impl Session {
         // What ends a subsystem comes from those around it.
         let of = |name: Ident| self.parts().iter().find(|part| part.name == name).and_then(|part| part.of);
         let inside = match frame.by {
-            Requester::Coordinator(name) => Ident::new(name.as_str()).ok().and_then(of),
+            // By the text: the name of one that is deeper is no single name.
+            Requester::Coordinator(name) => self.parts().iter().find(|part| part.name.as_str() == name.as_str()),
             Requester::Operator | Requester::Safety => None,
         };
+        let inside = inside.and_then(|part| part.of);
         let around =
             |outer: &Ident| inside.is_some_and(|inside| of(*outer).is_none_or(|of| inside.local(of).is_some()));
         let outer = self.who_hears(shutdown, &[]).find(around);

@@ -75,6 +75,39 @@ const LINE_COORDINATOR: &str = "return state {
   trans { src = 'ending', tgt = 'off', events = { 'inner/down', 'inner/e_end.ignored' } },
 }";
 
+/// A conveyor that is held inside of the state in which it hears the stop.
+const ALIVE: &str = "coordinator:
+  states:
+    off: {}
+    alive:
+      states:
+        building: { entry: build }
+        starting: { entry: run }
+        running: {}
+        failed: {}
+        held: { config: hold, states: { whole: {}, in_part: {} }, transitions: [{ src: initial, tgt: whole }, { src: whole, tgt: in_part, events: [hold.failed, hold.broken] }] }
+        stopping: { entry: run.undo }
+        removing: { entry: build.undo }
+      transitions:
+        - { src: initial, tgt: building }
+        - { src: building, tgt: starting, events: build.ok }
+        - { src: starting, tgt: running, events: run.ok }
+        - { src: building, tgt: failed, events: [build.failed, build.broken] }
+        - { src: starting, tgt: failed, events: [run.failed, run.broken] }
+        - { src: held, tgt: failed, events: e_reset }
+        - { src: building, tgt: stopping, events: e_end }
+        - { src: starting, tgt: stopping, events: e_end }
+        - { src: running, tgt: stopping, events: e_end }
+        - { src: failed, tgt: stopping, events: e_end }
+        - { src: held, tgt: stopping, events: e_end }
+        - { src: stopping, tgt: removing, events: [run.undone, run.undo.failed, run.undo.broken] }
+  transitions:
+    - { src: initial, tgt: off }
+    - { src: off, tgt: alive, events: e_start }
+    - { src: alive, tgt: alive.held, events: e_stop, effect: e_stopped }
+    - { src: alive, tgt: off, events: [build.undone, build.undo.failed, build.undo.broken] }
+";
+
 fn hall() -> Demo {
     let demo = Demo::new();
     for file in ["conveyor.yaml", "configurations.yaml", "coordinator.yaml"] {
@@ -247,6 +280,15 @@ fn who_ends_a_subsystem_by_an_answer_is_told_where_it_is_stopped_alone() {
     hears(&demo);
     demo.replace("hall_coordinator.yaml", "[e_stop, belt/e_stopped]", "e_stop");
     assert!(alone(&demo).contains("hear `belt/e_stopped` (by which that is told) in `root.dimming`"));
+    // Told in one place, where a state takes it up into one of its own.
+    let demo = hall();
+    hears(&demo);
+    demo.write("coordinator.yaml", ALIVE);
+    demo.replace("conveyor.yaml", "up: running, failed: [failed]", "up: alive.running, failed: [alive.failed]");
+    let silent = demo.run(&["check", "hall.yaml", "--json"]).json();
+    assert!(told(&demo).is_empty() && silent["ok"] == true, "{silent:#}");
+    demo.replace("coordinator.yaml", ", effect: e_stopped", "");
+    alone(&demo);
     // One between passes it on, or does not.
     for passes_on in [false, true] {
         let demo = hall();

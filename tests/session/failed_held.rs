@@ -66,6 +66,11 @@ struct Hall {
 
 impl Hall {
     fn new(file: &str, change: impl Fn(&str, String) -> String) -> Self {
+        Self::with(&[], file, change)
+    }
+
+    /// With these files beside it.
+    fn with(files: &[(&str, &str)], file: &str, change: impl Fn(&str, String) -> String) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let conveyor = |name: &str| {
             std::fs::read_to_string(format!("{}/examples/conveyor/{name}", env!("CARGO_MANIFEST_DIR"))).unwrap()
@@ -74,14 +79,13 @@ impl Hall {
         ["conveyor.yaml", "configurations.yaml", "coordinator.yaml"]
             .into_iter()
             .for_each(|name| write(name, conveyor(name)));
-        for (name, text) in [
+        let shared = [
             ("hall.yaml", HALL),
             ("hall.lua", HALL_COORDINATOR),
             ("lamp.yaml", LAMP),
             ("none.yaml", "configurations: {}\n"),
-        ] {
-            write(name, text.to_owned());
-        }
+        ];
+        shared.iter().chain(files).for_each(|(name, text)| write(name, (*text).to_owned()));
         let read = app::read(&folder.path().join(file), &LoadOptions::default(), libraries::builtin());
         let checked = read.and_then(app::check).unwrap_or_else(|refused| panic!("{:#?}", refused.findings));
         let clock = Clock::simulated();
@@ -312,4 +316,57 @@ fn to_have_failed_by_the_emergency_itself_lets_go_of_nothing() {
     let (took, not_up) = hall.bring_up(&[(1.0, "e_stop"), (60.0, "shutdown")]);
     assert!(not_up.unwrap_err().interrupted && took >= 60.0, "{took}");
     assert!(hall.first("hold.undone").is_some_and(|at| at >= 60.0), "{:?}", hall.first("hold.undone"));
+}
+
+/// What is stopped on its way down, deeper than in a subsystem: whoever hears the end of the deployment is named, not force alone.
+#[test]
+fn what_leads_on_from_a_stop_further_down_is_named() {
+    let line = "davit: 1
+name: line
+platform: simulated
+types: {}
+subsystems: { inner: { deployment: conveyor.yaml } }
+configurations: none.yaml
+coordinator: line.lua
+safety: e_stop
+deploy:   { event: e_start, up: on, failed: failed, within_s: 8 }
+shutdown: { event: e_end, down: off, within_s: 8 }
+";
+    let chart = "return state {
+  off = state {}, raising = state { entry = 'inner/e_start' }, on = state {}, failed = state {}, ending = state { entry = 'inner/e_end' },
+  trans { src = 'initial', tgt = 'off' },
+  trans { src = 'off', tgt = 'raising', events = { 'e_start' } },
+  trans { src = 'raising', tgt = 'on', events = { 'inner/up' } },
+  trans { src = 'raising', tgt = 'failed', events = { 'inner/failed' } },
+  trans { src = 'raising', tgt = 'ending', events = { 'e_end' } },
+  trans { src = 'failed', tgt = 'ending', events = { 'e_end' } },
+  trans { src = 'on', tgt = 'ending', events = { 'e_end' } },
+  trans { src = 'ending', tgt = 'ending', events = { 'e_end' } },
+  trans { src = 'ending', tgt = 'off', events = { 'inner/down', 'inner/e_end.ignored' } },
+}";
+    let deeper = |name: &str, text: String| match name {
+        "hall.yaml" => text.replace("left: { deployment: conveyor.yaml }", "left: { deployment: line.yaml }").replace(
+            "step: start left/belt, how: slow, takes_s: 3",
+            "step: stop left/inner/belt, how: slow, takes_s: 3",
+        ),
+        _ => text,
+    };
+    let hall = Hall::with(&[("line.yaml", line), ("line.lua", chart)], "hall.yaml", deeper);
+    let (_, up) = hall.bring_up(&[]);
+    up.unwrap();
+    let (clock, session) = (hall.clock.clone(), hall.session.clone());
+    let (told, says) = std::sync::mpsc::channel();
+    hall.clock.spawn("somebody", move || {
+        clock.sleep(Duration::from_secs_f64(0.3));
+        session.raise(EventName::new("e_stop").unwrap(), "test");
+        clock.sleep(Duration::from_secs_f64(3.5));
+        told.send(session.status().stopping.and_then(|stopping| stopping.stands_still())).unwrap();
+        session.command(Command::Shutdown { force: false });
+        clock.sleep(Duration::from_secs_f64(20.0));
+        session.command(Command::Shutdown { force: true });
+    });
+    let ended = hall.session.take_down(false);
+    let still = says.recv().unwrap().expect("it stands still");
+    assert!(still.contains("`davit shutdown` raises `e_close` once more, which `hall` hears there"), "{still}");
+    assert!(ended.is_clean(), "{ended:?}");
 }
