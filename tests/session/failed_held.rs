@@ -345,10 +345,11 @@ shutdown: { event: e_end, down: off, within_s: 8 }
   trans { src = 'ending', tgt = 'off', events = { 'inner/down', 'inner/e_end.ignored' } },
 }";
     let deeper = |name: &str, text: String| match name {
-        "hall.yaml" => text.replace("left: { deployment: conveyor.yaml }", "left: { deployment: line.yaml }").replace(
-            "step: start left/belt, how: slow, takes_s: 3",
-            "step: stop left/inner/belt, how: slow, takes_s: 3",
-        ),
+        "hall.yaml" => {
+            let (text, _) = text.split_once("faults:").unwrap();
+            text.replace("left: { deployment: conveyor.yaml }", "left: { deployment: line.yaml }")
+                + "faults: [{ step: stop left/inner/belt, how: slow, takes_s: 3 }]\nlimits: { step_timeout_s: 30 }\n"
+        }
         _ => text,
     };
     let hall = Hall::with(&[("line.yaml", line), ("line.lua", chart)], "hall.yaml", deeper);
