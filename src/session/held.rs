@@ -6,7 +6,7 @@ use super::hub::Hub;
 use super::{Session, Unanswered};
 use crate::configurator::{ConfiguratorHandle, FrameView, Requester};
 use crate::limits;
-use crate::model::{ConfigId, Deployment, EventName, Ident};
+use crate::model::{ConfigId, Deployment, EventName, FAULTED, Ident};
 use crate::time::{Clock, Time, lock};
 use rustc_hash::FxHashSet;
 use std::sync::Mutex;
@@ -48,7 +48,8 @@ impl Session {
     fn lets_go(&self, by: Requester) -> Vec<EventName> {
         let ends = self.deployment().shutdown.event;
         let leads_on = |event: &EventName| {
-            *event != ends && !self.junction().alarms.is_one(*event) && self.may_raise(event.as_str()).is_ok()
+            let is_told = event.as_str().ends_with(FAULTED) || self.junction().alarms.is_one(*event);
+            *event != ends && !is_told && self.may_raise(event.as_str()).is_ok()
         };
         let hears = |event: &EventName| self.who_hears(*event, &[]).any(|part| may_let_go(by, part));
         self.events().into_iter().filter(leads_on).filter(hears).collect()
@@ -59,8 +60,10 @@ impl Session {
         let held = self.coming_up_held.load(Ordering::Relaxed);
         let safe = frames.iter().find(|frame| held && self.is_safe(frame.configuration))?;
         let heard = self.lets_go(safe.by);
-        let leads_on = match heard.len() {
-            0 => "an event that its coordinator hears leads on".to_owned(),
+        let leads_on = match (safe.by, heard.len()) {
+            // No coordinator lets go of what somebody else has made safe.
+            (Requester::Operator, _) => format!("`davit undo {}` lets go of it", safe.configuration),
+            (_, 0) => "an event that its coordinator hears leads on".to_owned(),
             _ => format!("{} leads on", one_of(&heard)),
         };
         let leads_on = format!("{leads_on}, `davit shutdown` leads it down");
