@@ -32,7 +32,7 @@ impl Session {
         self.waits_for_people(Time::default()).unwrap_or(true)
     }
 
-    /// The same of a bring-up that has failed: what a coordinator makes safe since that failed, and nobody has stopped anything, is its own way to
+    /// Whether a bring-up that has failed waits for people: what a coordinator makes safe since that failed, and nobody has stopped anything, is its own way to
     /// fail.
     pub(super) fn fails_in_emergency(&self, began: Time) -> Result<bool, Unanswered> {
         if self.junction().alarms.came_since(began) || !self.may_be_held() {
