@@ -21,6 +21,9 @@ pub const MOST_UNTAKEN: usize = 3;
 /// So often one event comes before it tells something, where less is known of its inbox; what comes once more changes nothing.
 const MOST_REPEATED: u8 = 1;
 
+/// So many possible things are gone through in the time in which one transition of the parent is followed.
+const POSSIBLE_A_STEP: usize = 32;
+
 /// A state that it may be in, and what it has not taken yet: places among the events that it takes, from 1 on.
 type Possible = (u32, [u8; MOST_UNTAKEN]);
 
@@ -59,6 +62,8 @@ pub struct Beliefs {
     raised: FxHashMap<(u32, u8), (u32, bool)>,
     /// Something was raised where so many events may lie in its inbox already that one more was not followed there.
     filled: bool,
+    /// How many possible things were gone through for all this.
+    work: usize,
 }
 
 impl Beliefs {
@@ -90,6 +95,7 @@ impl Beliefs {
             tells,
             raised,
             filled: false,
+            work: 0,
         };
         beliefs.of([(start, [0; MOST_UNTAKEN])], None);
         beliefs
@@ -98,6 +104,11 @@ impl Beliefs {
     /// So many events lie in its inbox at once.
     pub fn most_untaken(&self) -> usize {
         self.most_untaken
+    }
+
+    /// What it has taken to know all this, in steps that are as much as the one from one state of its parent to the next.
+    pub fn work(&self) -> usize {
+        self.work / POSSIBLE_A_STEP
     }
 
     /// Whether something was raised where its inbox may have been too full for that.
@@ -221,6 +232,7 @@ impl Beliefs {
                 open.extend(self.silently(number).iter());
             }
         }
+        self.work += set.len();
         set.sort_unstable();
         let set: Belief = set.into();
         u32::try_from(self.sets.insert_full((set, repeated)).0).unwrap_or(u32::MAX)

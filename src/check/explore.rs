@@ -163,7 +163,7 @@ impl Graph<'_, '_> {
                 continue;
             }
             looked_at += 1;
-            if self.edges.len() >= share_of(failed, self.product.effort.transitions()) {
+            if self.edges.len() + self.product.known_by() >= share_of(failed, self.product.effort.transitions()) {
                 self.cut(Bound::Budget, failed);
                 continue;
             }

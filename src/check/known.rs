@@ -57,6 +57,11 @@ impl<'a> Product<'a> {
         known.any(Beliefs::was_filled)
     }
 
+    /// What it has taken to know what they may tell, in transitions.
+    pub(super) fn known_by(&self) -> usize {
+        self.children.iter().filter_map(|child| child.beliefs.as_ref()).map(Beliefs::work).sum()
+    }
+
     /// From now on they may tell anything in any order.
     pub(super) fn forget_children(&mut self) {
         self.children.iter_mut().for_each(|child| child.beliefs = None);

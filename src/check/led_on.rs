@@ -4,13 +4,14 @@
 //! answers, by time, or by whatever comes first; nor, from where it is entered, by anything else that comes by itself. What was done of the emergency would be undone unasked, at the latest when part of it
 //! failed.
 
-use super::by_itself::ways_on;
+use super::by_itself::{by, ways_on};
 use super::coordinator::{ask_of, edges, place};
-use super::taken::enters;
+use super::taken::{Taken, enters, raised_by};
 use crate::model::codes::COORD_SAFE_LEFT;
 use crate::model::{Ask, ConfigId, Deployment, EventName, Finding, Findings, Origin, Verdict};
 use crate::statechart::{Chart, EdgeId, EventId, NodeId, NodeKind, RaiseMoment, RaiseSite};
 use rustc_hash::FxHashSet;
+use std::collections::BTreeMap;
 
 /// A state that takes something safe back when it is left.
 pub struct HeldSafe {
@@ -75,7 +76,77 @@ pub fn check(deployment: &Deployment, chart: &Chart) -> Findings {
             );
         }
     }
+    let known: FxHashSet<Origin> = findings.iter().map(|finding| finding.origin).collect();
+    findings.extend(let_go_later(deployment, chart).into_iter().filter(|finding| !known.contains(&finding.origin)));
     findings
+}
+
+/// Transitions that come by themselves after an event of safety, one after another, and let go of what that has made safe, though no state holds it: by its
+/// name, or since what is asked for takes its place in its group.
+fn let_go_later(deployment: &Deployment, chart: &Chart) -> Findings {
+    let is_safe = |id: ConfigId| deployment.configuration(id).is_some_and(|of| of.safe);
+    let safety: Vec<EventId> = deployment.safety.iter().map(|(event, _)| chart.event(*event)).collect();
+    let stops = edges(chart).filter(|edge| {
+        chart.triggers(*edge).is_some_and(|all| all.iter().any(|of| *of != EventId::OTHER && safety.contains(of)))
+    });
+    let mut made_safe: BTreeMap<ConfigId, FxHashSet<NodeId>> = BTreeMap::new();
+    for edge in stops {
+        let asks = raised_by(chart, edge).filter_map(|site| ask_of(deployment, site.name));
+        for id in
+            asks.filter_map(|ask| if let Ask::Apply(id) = ask { Some(id).filter(|id| is_safe(*id)) } else { None })
+        {
+            made_safe.entry(id).or_default().extend(Taken::of(chart, edge).entered);
+        }
+    }
+    let mut findings = Findings::new();
+    for (id, mut reached) in made_safe {
+        let mut open: Vec<(EdgeId, String)> =
+            edges(chart).filter_map(|edge| Some((edge, by(deployment, chart, edge)?))).collect();
+        let leaves = |reached: &FxHashSet<NodeId>, edge: EdgeId| {
+            let source = chart.ends(edge).0;
+            reached.iter().any(|node| chart.is_inside(*node, source))
+        };
+        while let Some(at) = open.iter().position(|(edge, _)| leaves(&reached, *edge)) {
+            let (edge, by) = open.swap_remove(at);
+            let Some(how) = lets_go(deployment, chart, edge, id) else {
+                reached.extend(Taken::of(chart, edge).entered);
+                continue;
+            };
+            let (source, target) = chart.ends(edge);
+            let message = format!(
+                "{by} leads from `{}` to `{}`, and {how}: nobody said that the emergency is over",
+                chart.fqn(source),
+                chart.fqn(target)
+            );
+            let finding = Finding::warning(COORD_SAFE_LEFT, message).at(chart.edge_origin(edge));
+            findings.push(finding.path(place(chart, RaiseMoment::Effect(edge))).help(format!(
+                "let an event of people lead on (`e_reset`) from where `{id}` is asked for to where that is done"
+            )));
+        }
+    }
+    findings
+}
+
+/// How a transition lets go of something safe that no state holds, in words; one that asks for something safe again does not.
+fn lets_go(deployment: &Deployment, chart: &Chart, edge: EdgeId, id: ConfigId) -> Option<String> {
+    let of = |id: ConfigId| deployment.configuration(id);
+    let sites = raised_by(chart, edge).filter(|site| !matches!(site.when, RaiseMoment::Exit(_)));
+    let asks: Vec<Ask> = sites.filter_map(|site| ask_of(deployment, site.name)).collect();
+    let asks_anew = |ask: &Ask| matches!(ask, Ask::Apply(id) if of(*id).is_some_and(|of| of.safe));
+    if asks.iter().any(asks_anew) {
+        return None;
+    }
+    let group = of(id)?.group;
+    // Of several another one may be in force still.
+    let alone = deployment.configurations.iter().filter(|of| of.safe).count() == 1;
+    asks.into_iter().find_map(|ask| match ask {
+        Ask::UndoOf(undone) if undone == id && alone => Some(format!("`{ask}` lets go of `{id}`")),
+        Ask::Undo if alone => Some(format!("`{ask}` lets go of what was applied last, `{id}` perhaps")),
+        Ask::Apply(other) if group.is_some() && of(other)?.group == group => {
+            Some(format!("`{other}` takes the place of `{id}` there, which is of its group"))
+        }
+        _ => None,
+    })
 }
 
 /// What takes that transition without anybody having said so, in words.

@@ -70,6 +70,7 @@ mod links;
 mod listeners;
 mod loss;
 mod members;
+mod merging;
 mod met;
 mod monitors;
 mod moves_back;

@@ -1,9 +1,10 @@
 //! How a subsystem may be stopped, and what its parent hears of that.
 
 use super::coordinator::{ask_of, edges};
-use super::taken::raised_by;
+use super::taken::raised_on_each_way;
 use crate::model::{Ask, Deployment, EventName, Subsystem};
 use crate::statechart::{Chart, EdgeId, EventId, NodeKind, compile};
+use rustc_hash::FxHashSet;
 
 /// A stop of a subsystem.
 #[derive(Debug, Clone)]
@@ -57,9 +58,9 @@ pub fn compiled(own: &Deployment) -> Vec<Chart> {
     own.charts().filter_map(|chart| compile(chart).0).collect()
 }
 
-/// What a file emits wherever one of these is taken up, and makes something safe, as far as one of these does; but for where it comes once more.
+/// What a file emits on each way on which one of these is taken up, and makes something safe, as far as one of these does; but for where it comes once more.
 fn told(own: &Deployment, charts: &[Chart], of: &[EventName]) -> Vec<EventName> {
-    let mut ways: Vec<(bool, Vec<EventName>)> = Vec::new();
+    let mut ways: Vec<(bool, FxHashSet<EventName>)> = Vec::new();
     for chart in charts {
         let heard: Vec<EventId> = of.iter().map(|of| chart.event(*of)).filter(|of| *of != EventId::OTHER).collect();
         let takes_up = |edge: &EdgeId| {
@@ -69,14 +70,18 @@ fn told(own: &Deployment, charts: &[Chart], of: &[EventName]) -> Vec<EventName> 
             let once_more = target == source || into;
             !once_more && chart.triggers(*edge).is_some_and(|all| heard.iter().any(|of| all.contains(of)))
         };
-        ways.extend(edges(chart).filter(takes_up).map(|edge| {
-            let raised: Vec<EventName> = raised_by(chart, edge).map(|site| site.name).collect();
-            (raised.iter().any(|name| makes_safe(own, *name)), raised)
-        }));
+        for edge in edges(chart).filter(takes_up) {
+            match raised_on_each_way(chart, edge) {
+                Some(all) => {
+                    ways.extend(all.into_iter().map(|way| (way.iter().any(|name| makes_safe(own, *name)), way)));
+                }
+                // Of too many ways nothing is told for sure.
+                None => ways.push((true, FxHashSet::default())),
+            }
+        }
     }
     let any_safe = ways.iter().any(|(safe, _)| *safe);
-    let ways: Vec<&Vec<EventName>> =
-        ways.iter().filter(|(safe, _)| *safe || !any_safe).map(|(_, raised)| raised).collect();
+    let ways: Vec<_> = ways.iter().filter(|(safe, _)| *safe || !any_safe).map(|(_, raised)| raised).collect();
     let emitted = own.emits.iter().map(|(event, _)| *event);
     emitted.filter(|event| !ways.is_empty() && ways.iter().all(|raised| raised.contains(event))).collect()
 }

@@ -121,7 +121,7 @@ impl<'s> ComingUp<'s> {
         if !session.may_be_held() {
             return now >= moment;
         }
-        LastMoment(moment).is_over(now, || session.junction().has_reacted())
+        LastMoment(moment).is_over(now, || session.junction().has_reacted(session.hub()))
     }
 
     /// A coordinator is in a state that says that it failed: it is stopped, but in an emergency. What stopping it would move then, nobody has
@@ -145,6 +145,13 @@ impl<'s> ComingUp<'s> {
                 }
                 Outlook::Open
             }
+            // Let go of just now: what comes at that moment is heard first as well.
+            Ok(false) if std::mem::take(&mut self.failed_held) => {
+                self.failed = Some(session.clock().now());
+                Outlook::Open
+            }
+            // What came while that was asked is heard first.
+            Ok(false) if !self.has_come(since) => Outlook::Open,
             // It may be one: asked once more, before anything moves.
             Err(Unanswered) if !std::mem::replace(&mut self.unanswered, true) => self.failed(),
             _ => Outlook::Stopped(format!("the coordinator is in `{state}`")),
@@ -167,6 +174,7 @@ impl<'s> ComingUp<'s> {
                 }
             }
             Ok(false) if std::mem::take(&mut self.held) => self.deadline = now + within,
+            Ok(false) if !self.has_come(self.deadline) => {}
             Err(Unanswered) if !std::mem::replace(&mut self.unanswered, true) => self.deadline = now + within,
             _ => return Outlook::Stopped(self.not_up()),
         }

@@ -3,14 +3,16 @@
 
 use super::halt::StandsStill;
 use super::hub::Hub;
+use super::parts::CoordinatorPart;
 use super::{Session, Unanswered};
 use crate::configurator::{ConfiguratorHandle, FrameView, Requester};
 use crate::limits;
-use crate::model::{ConfigId, Deployment, EventName, FAULTED, Ident};
+use crate::model::{Ask, ConfigId, Deployment, EventName, FAULTED, Ident};
+use crate::statechart::EdgeId;
 use crate::time::{Clock, Time, lock};
 use rustc_hash::FxHashSet;
 use std::sync::Mutex;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 impl Session {
     /// Whether something safe could hold it, and somebody is there to decide how to go on then.
@@ -32,15 +34,22 @@ impl Session {
         self.waits_for_people(Time::default()).unwrap_or(true)
     }
 
-    /// Whether a bring-up that has failed waits for people: what a coordinator makes safe since that failed, and nobody has stopped anything, is its own way to
-    /// fail.
+    /// Whether a bring-up that began then, and has failed, waits for people. Where nobody has stopped anything, what a coordinator makes safe that has
+    /// failed is its own way to fail; what another one does is not.
     pub(super) fn fails_in_emergency(&self, began: Time) -> Result<bool, Unanswered> {
         if self.junction().alarms.came_since(began) || !self.may_be_held() {
             return self.waits_for_people(began);
         }
-        let by_people = |frame: &FrameView| !matches!(frame.by, Requester::Coordinator(_));
-        let safe = |frame: &FrameView| frame.at >= began && self.is_safe(frame.configuration);
-        Ok(self.frames()?.iter().any(|frame| safe(frame) && by_people(frame)))
+        let has_failed: Vec<Requester> = self.has_failed().collect();
+        let holds = |id: ConfigId, by: Requester| self.is_safe(id) && !has_failed.contains(&by);
+        let asked_for = self.hub().asks_for(|of| matches!(of.ask, Ask::Apply(id) if holds(id, of.by)));
+        Ok(asked_for || self.frames()?.iter().any(|frame| frame.at >= began && holds(frame.configuration, frame.by)))
+    }
+
+    /// The coordinators that are in a state that says that they failed, those of subsystems among them.
+    fn has_failed(&self) -> impl Iterator<Item = Requester> {
+        let failed = self.parts().iter().filter(|part| part.failed_state().is_some());
+        failed.map(|part| Requester::Coordinator(part.name.into()))
     }
 
     /// The events from outside that the coordinator hears where it is that has made something safe (nobody's: any coordinator), but for those that
@@ -51,7 +60,15 @@ impl Session {
             let is_told = event.as_str().ends_with(FAULTED) || self.junction().alarms.is_one(*event);
             *event != ends && !is_told && self.may_raise(event.as_str()).is_ok()
         };
-        let hears = |event: &EventName| self.who_hears(*event, &[]).any(|part| may_let_go(by, part));
+        // One that is heard and comes back to where it was lets go of nothing.
+        let leaves = |part: &CoordinatorPart, edge: EdgeId| {
+            let (source, target) = part.coordinator.chart().ends(edge);
+            source != target
+        };
+        let hears = |event: &EventName| {
+            let mut may = self.parts().iter().filter(|part| may_let_go(by, part.name));
+            may.any(|part| part.takes(*event).any(|edge| leaves(part, edge)))
+        };
         self.events().into_iter().filter(leads_on).filter(hears).collect()
     }
 
@@ -60,13 +77,21 @@ impl Session {
         let held = self.coming_up_held.load(Ordering::Relaxed);
         let safe = frames.iter().find(|frame| held && self.is_safe(frame.configuration))?;
         let heard = self.lets_go(safe.by);
-        let leads_on = match (safe.by, heard.len()) {
+        let by = match (safe.by, heard.len()) {
             // No coordinator lets go of what somebody else has made safe.
-            (Requester::Operator, _) => format!("`davit undo {}` lets go of it", safe.configuration),
-            (_, 0) => "an event that its coordinator hears leads on".to_owned(),
-            _ => format!("{} leads on", one_of(&heard)),
+            (Requester::Operator, _) => format!("`davit undo {}`", safe.configuration),
+            (_, 0) => "an event that its coordinator hears".to_owned(),
+            _ => one_of(&heard),
         };
-        let leads_on = format!("{leads_on}, `davit shutdown` leads it down");
+        let leads_on = match (self.failed_state(), safe.by) {
+            (Some(state), _) => {
+                format!(
+                    "{by} lets go of it, and since the coordinator is in `{state}` it is led down then, as by `davit shutdown`"
+                )
+            }
+            (None, Requester::Operator) => format!("{by} lets go of it, `davit shutdown` leads it down"),
+            (None, _) => format!("{by} leads on, `davit shutdown` leads it down"),
+        };
         Some(StandsStill { safe: safe.configuration.to_string(), since: safe.at.as_secs_f64(), leads_on })
     }
 }
@@ -133,7 +158,33 @@ impl LastMoment {
 
     /// When it is looked at next.
     pub fn next_look(self, now: Time) -> Time {
-        if now < self.0 { self.0 } else { (self.0 + limits::LAST_LOOK).max(now + limits::LAST_LOOK) }
+        if now < self.0 { self.0 } else { now + limits::LAST_LOOK }
+    }
+}
+
+/// How many are being told of something: it is written down already, and not all of those have it in their inboxes whose it is.
+#[derive(Debug, Default)]
+pub(super) struct OnTheWay(AtomicUsize);
+
+/// One that is, as long as this is there.
+pub(super) struct BeingTold<'t>(&'t OnTheWay);
+
+impl OnTheWay {
+    /// Somebody is about to write something down, and to tell of it.
+    pub fn begin(&self) -> BeingTold<'_> {
+        self.0.fetch_add(1, Ordering::SeqCst);
+        BeingTold(self)
+    }
+
+    /// Whether nothing is.
+    pub fn is_none(&self) -> bool {
+        self.0.load(Ordering::SeqCst) == 0
+    }
+}
+
+impl Drop for BeingTold<'_> {
+    fn drop(&mut self) {
+        self.0.0.fetch_sub(1, Ordering::SeqCst);
     }
 }
 
@@ -147,9 +198,14 @@ impl SafeOnes {
         Self(ids.into_iter().collect())
     }
 
-    /// Whether there is none.
-    pub fn is_empty(&self) -> bool {
-        self.0.is_empty()
+    /// Whether a moment has come from which something is late that one of them could hold.
+    pub fn has_come(&self, moment: Time, now: Time, has_reacted: impl FnOnce() -> bool) -> bool {
+        if self.0.is_empty() { now >= moment } else { LastMoment(moment).is_over(now, has_reacted) }
+    }
+
+    /// When that is looked at next.
+    pub fn next_look(&self, moment: Time, now: Time) -> Time {
+        if self.0.is_empty() { moment } else { LastMoment(moment).next_look(now) }
     }
 
     /// The frames in force, to be asked about several subsystems; none: nobody answers.

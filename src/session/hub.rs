@@ -91,7 +91,9 @@ pub struct Outstanding {
     /// What was asked.
     pub ask: Ask,
     /// Who asked.
-    pub by: String,
+    pub by: Requester,
+    /// How that is told.
+    pub told: String,
 }
 
 /// What a name raised by a coordinator means.
@@ -258,10 +260,10 @@ impl Hub {
         self.lock().taps.push(tap);
     }
 
-    /// A new request of `by`.
-    pub fn request(&self, ask: Ask, by: &str) -> RequestId {
+    /// A new request of `by`, told as `told`.
+    pub fn request(&self, ask: Ask, by: Requester, told: &str) -> RequestId {
         let id = self.number();
-        self.requested(id, ask, by);
+        self.requested(id, ask, by, told.to_owned());
         id
     }
 
@@ -273,15 +275,20 @@ impl Hub {
     }
 
     /// A request of that number is made.
-    pub fn requested(&self, id: RequestId, ask: Ask, by: &str) {
-        let outstanding = Outstanding { ask, by: by.to_owned() };
+    pub fn requested(&self, id: RequestId, ask: Ask, by: Requester, told: String) {
+        let outstanding = Outstanding { ask, by, told: told.clone() };
         self.lock().outstanding.insert(id, outstanding);
-        self.note(Happening::Requested { request: Some(id.0), ask: ask.to_string(), by: by.to_owned() });
+        self.note(Happening::Requested { request: Some(id.0), ask: ask.to_string(), by: told });
     }
 
     /// Whether one of these is asked for, and not answered.
+    pub fn asks_for(&self, is: impl Fn(&Outstanding) -> bool) -> bool {
+        self.lock().outstanding.values().any(is)
+    }
+
+    /// Whether one of these is to be applied, and that not answered.
     pub fn applies(&self, is: impl Fn(ConfigId) -> bool) -> bool {
-        self.lock().outstanding.values().any(|of| matches!(of.ask, Ask::Apply(id) if is(id)))
+        self.asks_for(|of| matches!(of.ask, Ask::Apply(id) if is(id)))
     }
 
     /// A request was answered. It stays outstanding until it is [settled](Self::settled), when whoever asked has been told.
@@ -382,12 +389,12 @@ impl Hub {
         let state = self.lock();
         let mut list: Vec<_> = state.outstanding.iter().collect();
         list.sort_by_key(|(id, _)| **id);
-        list.into_iter().map(|(_, o)| format!("{} by {}", o.ask, o.by)).collect()
+        list.into_iter().map(|(_, o)| format!("{} by {}", o.ask, o.told)).collect()
     }
 
     /// Whether this is asked for and not answered.
     pub fn is_outstanding(&self, ask: Ask) -> bool {
-        self.lock().outstanding.values().any(|outstanding| outstanding.ask == ask)
+        self.asks_for(|of| of.ask == ask)
     }
 
     /// Whether every request raised so far has been answered.
@@ -396,8 +403,8 @@ impl Hub {
     }
 
     /// Whether every request that was made under that name has been answered.
-    pub fn has_answered(&self, by: &str) -> bool {
-        self.lock().outstanding.values().all(|outstanding| outstanding.by != by)
+    pub fn has_answered(&self, by: Requester) -> bool {
+        !self.asks_for(|of| of.by == by)
     }
 
     /// What is wrong.

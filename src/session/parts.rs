@@ -9,7 +9,7 @@ use crate::configurator::Requester;
 use crate::coordinator::CoordinatorHandle;
 use crate::functions::Opener;
 use crate::model::{Deployment, EventName, Ident};
-use crate::statechart::{Chart, EventId, NodeId};
+use crate::statechart::{Chart, EdgeId, EventId, NodeId};
 use crate::time::{Clock, lock};
 use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
@@ -96,6 +96,14 @@ impl CoordinatorPart {
     /// Whether some state of it may hear an event.
     pub fn may_hear(&self, event: EventName) -> bool {
         self.sees_all || self.chart.event(event) != EventId::OTHER
+    }
+
+    /// The transitions that an event may take from where it is.
+    pub fn takes(&self, event: EventName) -> impl Iterator<Item = EdgeId> + '_ {
+        let (chart, leaf) = (&*self.chart, self.coordinator.leaf());
+        let number = chart.event(event);
+        let inside = std::iter::successors(leaf, |node| chart.parent(*node)).filter(move |_| number != EventId::OTHER);
+        inside.flat_map(|node| chart.outgoing(node)).filter(move |edge| chart.may_trigger(*edge, number))
     }
 
     /// Its active state that means that the bring-up failed.

@@ -132,6 +132,7 @@ impl Session {
                 Err(NotAccepted::Detached) => gone = true,
             }
         }
+        let _on_the_way = self.junction().on_the_way.begin();
         self.hub().note(Happening::Event { event: event.to_string(), from: from.to_owned(), safety: false });
         self.configurator().event(event);
         self.junction().tell_leaving(self.configurator(), event);
@@ -189,7 +190,7 @@ pub(super) fn make_safe(hub: &Hub, configurator: &ConfiguratorHandle, event: Eve
     let Heeded { requests, apply } = hub.halt().heed(event, hub.now(), anew, || hub.number())?;
     for (id, request) in apply.iter().zip(&requests) {
         let ask = Ask::Apply(*id);
-        hub.requested(*request, ask, &Requester::Safety.to_string());
+        hub.requested(*request, ask, Requester::Safety, Requester::Safety.to_string());
         // A full queue has answered it already.
         let _ = configurator.submit(Batch::one(Request::new(*request, ask, Requester::Safety)));
     }

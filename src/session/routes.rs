@@ -1,7 +1,7 @@
 //! The ways between coordinator, configurator and platform: names raised become requests, answers and reports become
 //! events. Called in the threads of those who raise; nothing here waits.
 
-use super::held::Alarms;
+use super::held::{Alarms, OnTheWay};
 use super::hub::{Hub, Meaning};
 use super::log::{Happening, LoggedAnswer, StepTime};
 use super::raising::make_safe;
@@ -44,6 +44,7 @@ pub(super) struct Junction {
     /// Nobody drives it any more.
     closed: AtomicBool,
     pub alarms: Alarms,
+    pub on_the_way: OnTheWay,
     /// Held while an event is given to several coordinators: what one of them tells the others of it comes behind it everywhere.
     giving: Mutex<()>,
 }
@@ -58,9 +59,14 @@ impl Junction {
         Self { urgent, ends, subsystems: Some(subsystems), leaving, alarms, ..Self::default() }
     }
 
-    /// Whether every coordinator has done what it was to do by what came: what it asks for then has been asked for.
-    pub fn has_reacted(&self) -> bool {
-        lock(&self.coordinators).iter().all(|(_, coordinator)| coordinator.is_settled())
+    /// Whether every coordinator has done what it was to do by what came: what it asks for then has been asked for. What one of them told another one
+    /// meanwhile, who had been looked at already, is written down.
+    pub fn has_reacted(&self, hub: &Hub) -> bool {
+        let before = hub.epoch();
+        self.on_the_way.is_none()
+            && lock(&self.coordinators).iter().all(|(_, coordinator)| coordinator.is_settled())
+            && self.on_the_way.is_none()
+            && hub.epoch() == before
     }
 
     /// Its subsystems, if it has any.
@@ -176,7 +182,7 @@ impl Listener for ToConfigurator {
         for raised in batch {
             match self.hub.meaning(raised.name) {
                 Meaning::Request(ask) => {
-                    let id = self.hub.request(ask, &self.name.to_string());
+                    let id = self.hub.request(ask, self.name, &self.name.to_string());
                     let tag = (raised.owner.index() as u64, u64::from(raised.visit));
                     let scope = raised.scope.and_then(|state| u32::try_from(state.index()).ok()).map(Scope);
                     let request = Request { scope, tag, ..Request::new(id, ask, self.name) };
@@ -389,6 +395,7 @@ pub(super) fn on_progress(hub: &Hub, junction: &Junction, steps: &Steps, progres
         Progress::Stuck(why) => hub.note(Happening::Noted { note: why.clone() }),
         Progress::Lost { configuration, reason } => {
             let event = Verdict::Lost.event(Ask::Apply(*configuration));
+            let _on_the_way = junction.on_the_way.begin();
             hub.note(Happening::Lost { event: event.to_string(), reasons: reason.told() });
             // In whatever state they are: it answers nothing that was asked there.
             let path = junction.subsystems().and_then(|subsystems| subsystems.path_of(event));
@@ -424,6 +431,7 @@ pub(super) fn on_answer(hub: &Hub, junction: &Junction, steps: &Steps, answer: &
 
 fn give(hub: &Hub, junction: &Junction, answer: &Answer, steps: Vec<StepTime>, class: Class) {
     let event = answer.event();
+    let _on_the_way = junction.on_the_way.begin();
     let reasons = answer.reason.as_ref().map(|reason| reason.told()).unwrap_or_default();
     hub.answered(LoggedAnswer {
         request: answer.request.id.0,
@@ -477,6 +485,7 @@ pub(super) fn on_platform(hub: &Hub, junction: &Junction, event: &PlatformEvent)
         hub.note(Happening::Noted { note: format!("`{event}` of `{from}` is passed over: {NO_MORE}") });
         return;
     }
+    let _on_the_way = junction.on_the_way.begin();
     hub.raised(event, from);
     hub.halt().report(event);
     let acts = || configurator.as_ref().and_then(|configurator| make_safe(hub, configurator, event, Class::Report));

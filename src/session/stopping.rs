@@ -413,14 +413,7 @@ impl Session {
     /// The coordinators that hear an event where they are, but for these.
     pub(super) fn who_hears(&self, event: EventName, but: &[Requester]) -> impl Iterator<Item = Ident> {
         let others = self.parts().iter().filter(|part| !but.contains(&Requester::Coordinator(part.name.into())));
-        let hearing = others.filter(move |part| {
-            let (chart, leaf) = (part.coordinator.chart(), part.coordinator.leaf());
-            let number = chart.event(event);
-            let mut inside = std::iter::successors(leaf, |node| chart.parent(*node));
-            let hears = |node: NodeId| chart.outgoing(node).any(|edge| chart.may_trigger(edge, number));
-            number != EventId::OTHER && inside.any(hears)
-        });
-        hearing.map(|part| part.name)
+        others.filter(move |part| part.takes(event).next().is_some()).map(|part| part.name)
     }
 }
 

@@ -1,6 +1,6 @@
 //! The subsystems of a deployment that runs (semantics: *Composition*): who hears what, and what a parent is told without anybody writing it.
 
-use super::held::{LastMoment, SafeOnes};
+use super::held::SafeOnes;
 use super::hub::Hub;
 use super::log::{Happening, Phase, SubsystemStatus};
 use super::routes::Junction;
@@ -271,7 +271,7 @@ impl Subsystems {
     pub fn emptied(&self, path: Ident, hub: &Hub, junction: &Junction) {
         let inside = |of: &Ident| *of == path || of.local(path).is_some();
         let mut own = self.of.iter().filter(|(_, of)| inside(of));
-        if !own.all(|(by, _)| hub.has_answered(&by.to_string())) {
+        if !own.all(|(by, _)| hub.has_answered(*by)) {
             return;
         }
         if let Some(at) = self.all.iter().position(|known| known.path == path) {
@@ -335,7 +335,7 @@ impl Subsystems {
         let before = hub.epoch();
         for (name, states) in &known.coordinators {
             let Some(coordinator) = junction.coordinator(*name) else { return SeenStanding::default() };
-            let rest = coordinator.is_settled() && hub.has_answered(&name.to_string());
+            let rest = coordinator.is_settled() && hub.has_answered(*name);
             seen.up &= rest && is_in(&coordinator, &states.up);
             seen.down &= rest && is_in(&coordinator, &states.down);
             seen.failed |= states.failed.iter().any(|state| is_in(&coordinator, state));
@@ -395,9 +395,7 @@ impl Subsystems {
                 // One that is over meanwhile is looked at at once.
                 let of = |life: &SubsystemLife| life.until().filter(|_| !life.is_late);
                 let next = lock(&own.lives).iter().filter_map(of).min();
-                let look =
-                    |over: Time| if own.safe.is_empty() { over } else { LastMoment(over).next_look(own.clock.now()) };
-                own.wake.wait(next.map_or(Time::NEVER, look));
+                own.wake.wait(next.map_or(Time::NEVER, |over| own.safe.next_look(over, own.clock.now())));
                 let Some(junction) = junction.upgrade() else { return };
                 if junction.is_closed() {
                     return;
@@ -412,9 +410,7 @@ impl Subsystems {
     /// they let go.
     fn times_are_over(&self, hub: &Hub, junction: &Junction) {
         let now = self.clock.now();
-        let is_over = |until: Time| {
-            if self.safe.is_empty() { now >= until } else { LastMoment(until).is_over(now, || junction.has_reacted()) }
-        };
+        let is_over = |until: Time| self.safe.has_come(until, now, || junction.has_reacted(hub));
         let over = |life: &SubsystemLife| life.until().filter(|until| !life.is_late && is_over(*until));
         if !lock(&self.lives).iter().any(|life| over(life).is_some()) {
             return;
@@ -428,6 +424,10 @@ impl Subsystems {
                 (until, life.since, if life.up_until.is_some() { known.up_within } else { known.down_within })
             };
             let held = self.safe.hold(hub, frames.as_deref(), known.path, since);
+            // What came while the frames were asked for is heard first.
+            if !held && !is_over(until) {
+                continue;
+            }
             let life = &mut lock(&self.lives)[at];
             // It may have been begun, or ended, meanwhile.
             if life.until() == Some(until) {

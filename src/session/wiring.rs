@@ -218,7 +218,7 @@ impl Session {
 
     /// The same through a connection: requests of one connection (other than 0) begin one after the other.
     pub fn request_on(&self, line: u32, ask: Ask, by: &str, force: bool) -> RequestId {
-        let id = self.hub.request(ask, by);
+        let id = self.hub.request(ask, Requester::Operator, by);
         let request = Request { force, line, ..Request::new(id, ask, Requester::Operator) };
         // A full queue has answered it already.
         let _ = self.configurator.submit(Batch::one(request));
@@ -397,7 +397,7 @@ impl Session {
         state: impl Fn(&CoordinatorPart) -> Option<NodeId>,
     ) -> bool {
         let before = self.hub.epoch();
-        let answered = |part: &CoordinatorPart| self.hub.has_answered(part.name.as_str());
+        let answered = |part: &CoordinatorPart| self.hub.has_answered(Requester::Coordinator(part.name.into()));
         let rest = (self.hub.all_answered() || self.parts.iter().filter(|part| counts(part)).all(answered))
             && self.parts.iter().filter(|part| counts(part)).all(|part| {
                 part.coordinator.is_settled() && state(part).is_some_and(|id| part.coordinator.is_active(id))

@@ -387,6 +387,25 @@ fn who_lets_go_of_one_unasked_is_told() {
         let told = found(&demo, "coord::safe_left");
         assert_eq!(told.len(), usize::from(is_told), "{first}: {told:?}");
     }
+    // What no state holds: by its name, or by what takes its place.
+    for (by, told) in [
+        (
+            "tgt: failed, events: [e_after(5)], effect: stop.undo",
+            "`e_after(5) s` leads from `root.stopped` to `root.failed`, and `stop.undo` lets go of `stop`",
+        ),
+        ("tgt: failed, events: [stop.ok], effect: undo", "`undo` lets go of what was applied last"),
+        ("tgt: up.fast, events: [motor.faulted]", "`fast` takes the place of `stop` there, which is of its group"),
+        ("tgt: failed, events: [e_reset], effect: stop.undo", ""),
+        ("tgt: up.fast, events: [e_reset]", ""),
+        ("tgt: stopped, events: [e_after(5)], effect: stop.undo", ""),
+    ] {
+        let demo = belt();
+        demo.replace("belt/coordinator.yaml", "      config: stop\n", "      entry: stop\n");
+        demo.replace("belt/coordinator.yaml", reset, &format!("{{ src: stopped, {by} }}"));
+        let found = found(&demo, "coord::safe_left");
+        assert_eq!(found.len(), usize::from(!told.is_empty()), "{by}: {found:?}");
+        assert!(found.iter().all(|one| one["message"].as_str().unwrap().contains(told)), "{by}: {found:?}");
+    }
     // The help of a failure that nobody hears does not lead there.
     let demo = belt();
     demo.replace("belt/coordinator.yaml", "events: [stop.failed, stop.broken]", "events: [e_looked]");

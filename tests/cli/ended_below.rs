@@ -289,6 +289,25 @@ fn who_ends_a_subsystem_by_an_answer_is_told_where_it_is_stopped_alone() {
     assert!(told(&demo).is_empty() && silent["ok"] == true, "{silent:#}");
     demo.replace("coordinator.yaml", ", effect: e_stopped", "");
     alone(&demo);
+    // Behind a connector, on each of the ways or on one of them.
+    for second in ["effect: e_stopped, ", ""] {
+        let demo = hall();
+        hears(&demo);
+        demo.replace("coordinator.yaml", "    left: {}\n", "    left: {}\n    which: { connector: true }\n");
+        demo.replace(
+            "coordinator.yaml",
+            "{ src: failed, tgt: held, events: [e_stop], effect: e_stopped }",
+            &format!(
+                "{{ src: failed, tgt: which, events: [e_stop] }}
+    - {{ src: which, tgt: held, effect: e_stopped, events: [e_stop] }}
+    - {{ src: which, tgt: held, {second}events: [e_stop] }}"
+            ),
+        );
+        match second.is_empty() {
+            true => assert!(alone(&demo).contains("let the subsystem emit an event")),
+            false => assert!(told(&demo).is_empty(), "{:?}", told(&demo)),
+        }
+    }
     // One between passes it on, or does not.
     for passes_on in [false, true] {
         let demo = hall();

@@ -210,6 +210,35 @@ fn a_subsystem_is_late_once_what_came_at_that_moment_is_heard() {
     }
 }
 
+/// A stop that is written down already, and takes a while until it is in the inboxes (on the real clock whoever tells it may be interrupted): it counts from
+/// where it is told.
+#[test]
+fn a_stop_that_is_on_the_way_holds() {
+    let failing = Hall::new("conveyor.yaml", with_a_lamp);
+    let slow = |at_once: bool| {
+        move |name: &str, text: String| match name {
+            "hall.yaml" => text.replace("takes_s: 3", "takes_s: 8") + "limits: { step_timeout_s: 30 }\n",
+            "conveyor.yaml" if at_once => {
+                text + "faults: [{ step: start belt, how: slow, takes_s: 8 }]\nlimits: { step_timeout_s: 30 }\n"
+            }
+            _ => text,
+        }
+    };
+    let late = Hall::new("conveyor.yaml", slow(true));
+    let late_inside = Hall::new("hall.yaml", slow(false));
+    for (hall, at) in [(failing, 1.9995), (late, 4.9995), (late_inside, 4.9995)] {
+        let clock = hall.clock.clone();
+        hall.session.hub().observe(Arc::new(move |_, happening: &Happening| {
+            if matches!(happening, Happening::Event { event, .. } if event == "e_stop") {
+                clock.sleep(Duration::from_millis(3));
+            }
+        }));
+        let (took, not_up) = hall.bring_up(&[(at, "e_stop"), (60.0, "shutdown")]);
+        assert!(not_up.is_err() && took >= 60.0, "{at}: {took}");
+        assert_eq!(hall.first("left/failed"), None);
+    }
+}
+
 /// A conveyor that warms up for two seconds, and goes on with that when it is let go.
 fn with_warming(text: &str) -> String {
     text
@@ -300,6 +329,64 @@ fn another_coordinator_that_fails_ends_no_emergency() {
     let (took, not_up) = hall.bring_up(&[(1.0, "e_stop"), (60.0, "e_reset")]);
     assert!(!not_up.unwrap_err().interrupted && took >= 60.0, "{took}");
     assert!(hall.first("hold.undone").is_some_and(|at| at >= 60.0), "{:?}", hall.first("hold.undone"));
+}
+
+/// What one made safe that has not failed, without an event of safety, is not that one's way to fail when another one does: neither where it was so before,
+/// nor where it is asked for at that moment, nor where that was its answer to it.
+#[test]
+fn what_one_makes_safe_is_not_let_go_when_another_one_fails() {
+    let jams = |name: &str, text: String| match name {
+        "coordinator.yaml" => text
+            .replace("src: up, tgt: held, events: [e_stop] }", "src: up, tgt: held, events: [e_stop, e_jam, e_dark] }"),
+        _ => with_a_lamp(name, text),
+    };
+    let slowly = |name: &str, text: String| match name {
+        "conveyor.yaml" => {
+            jams(name, text) + "faults: [{ step: operation_call belt.brake, how: slow, takes_s: 0.5 }]\n"
+        }
+        _ => jams(name, text),
+    };
+    let tells = |name: &str, text: String| match name {
+        "lamp.yaml" => text.replace("failed: {} }", "failed: { entry: e_dark } }"),
+        _ => jams(name, text),
+    };
+    let before = Hall::new("conveyor.yaml", jams);
+    let asked_for = Hall::new("conveyor.yaml", slowly);
+    let answer = Hall::new("conveyor.yaml", tells);
+    for (hall, raised, at) in [(before, "e_jam", 1.0), (asked_for, "e_jam", 1.9), (answer, "e_other", 1.0)] {
+        let (took, not_up) = hall.bring_up(&[(at, raised), (60.0, "e_reset")]);
+        assert!(!not_up.unwrap_err().interrupted && took >= 60.0, "{at}: {took}");
+        assert!(hall.first("hold.undone").is_some_and(|at| at >= 60.0), "{at}: {:?}", hall.first("hold.undone"));
+    }
+}
+
+/// What comes at the very moment in which one that has failed is let go is heard first, too.
+#[test]
+fn a_stop_at_the_moment_of_letting_go_holds() {
+    let hall = Hall::new("conveyor.yaml", with_a_lamp);
+    let (took, not_up) = hall.bring_up(&[(1.0, "e_stop"), (5.0, "e_reset"), (5.0005, "e_stop"), (60.0, "e_reset")]);
+    assert!(!not_up.unwrap_err().interrupted && took >= 60.0, "{took}");
+}
+
+/// Who asks is told what lets go of it, and that it is led down then since it has failed; not what only comes back to where it was.
+#[test]
+fn what_lets_go_of_one_that_has_failed_is_named() {
+    let looks = |name: &str, text: String| match name {
+        "coordinator.yaml" => text.replace("tgt: held, events: [e_stop] }", "tgt: held, events: [e_stop, e_look] }"),
+        _ => with_a_lamp(name, text),
+    };
+    let hall = Hall::new("conveyor.yaml", looks);
+    let (clock, session) = (hall.clock.clone(), hall.session.clone());
+    let (told, says) = std::sync::mpsc::channel();
+    hall.clock.spawn("somebody", move || {
+        clock.sleep(Duration::from_secs_f64(3.0));
+        told.send(session.status().stands_still).unwrap();
+    });
+    let (_, not_up) = hall.bring_up(&[(1.0, "e_stop"), (60.0, "shutdown")]);
+    assert!(not_up.is_err());
+    let still = says.recv().unwrap().expect("it stands still").leads_on;
+    let expected = "`davit event e_reset` lets go of it, and since the coordinator is in `failed` it is led down then";
+    assert!(still.starts_with(expected), "{still}");
 }
 
 /// Where to be stopped means to have failed, that is no reason to let go either, and what makes it safe is waited for.
