@@ -31,8 +31,8 @@ struct ComingUp<'s> {
 enum Outlook {
     /// It goes on.
     Open,
-    /// It is stopped, for that reason.
-    Stopped(String),
+    /// It is stopped, for that reason, since that moment has come; what was written down up to that count has been heard.
+    Stopped { why: String, moment: Time, seen: u64 },
 }
 
 impl Session {
@@ -65,7 +65,7 @@ impl Session {
             if !self.leads() {
                 break ("a coordinator has ended".to_owned(), false);
             }
-            if let Outlook::Stopped(why) = coming.failed() {
+            if let Some(why) = coming.failed().begins(self) {
                 break (why, false);
             }
             if self.is_up() {
@@ -83,7 +83,7 @@ impl Session {
                     continue;
                 }
             }
-            if let Outlook::Stopped(why) = coming.late() {
+            if let Some(why) = coming.late().begins(self) {
                 break (why, false);
             }
             self.tell_slow();
@@ -103,6 +103,17 @@ impl Session {
             "{why}, and something safe holds it: {leads_on} (`davit status` says where it is), `davit shutdown` leads it down"
         );
         self.hub().note(Happening::Noted { note });
+    }
+}
+
+impl Outlook {
+    /// Why it is stopped from now on, if it is: what is told meanwhile was before that, and is heard first.
+    fn begins(self, session: &Session) -> Option<String> {
+        let Self::Stopped { why, moment, seen } = self else { return None };
+        let has_begun = !session.may_be_held()
+            || session.hub().begin_phase(Phase::ShuttingDown, seen)
+            || session.clock().now() >= moment + limits::VIEW;
+        has_begun.then_some(why)
     }
 }
 
@@ -133,6 +144,7 @@ impl<'s> ComingUp<'s> {
             return Outlook::Open;
         };
         let since = *self.failed.get_or_insert_with(|| session.clock().now());
+        let seen = session.hub().epoch();
         if !self.has_come(since) {
             return Outlook::Open;
         }
@@ -154,13 +166,14 @@ impl<'s> ComingUp<'s> {
             Ok(false) if !self.has_come(since) => Outlook::Open,
             // It may be one: asked once more, before anything moves.
             Err(Unanswered) if !std::mem::replace(&mut self.unanswered, true) => self.failed(),
-            _ => Outlook::Stopped(format!("the coordinator is in `{state}`")),
+            _ => Outlook::Stopped { why: format!("the coordinator is in `{state}`"), moment: since, seen },
         }
     }
 
     /// Its time is over: it is stopped, but while something safe holds it. Let go of, it has its time anew.
     fn late(&mut self) -> Outlook {
-        if !self.has_come(self.deadline) {
+        let (moment, seen) = (self.deadline, self.session.hub().epoch());
+        if !self.has_come(moment) {
             return Outlook::Open;
         }
         let (session, now) = (self.session, self.session.clock().now());
@@ -176,7 +189,7 @@ impl<'s> ComingUp<'s> {
             Ok(false) if std::mem::take(&mut self.held) => self.deadline = now + within,
             Ok(false) if !self.has_come(self.deadline) => {}
             Err(Unanswered) if !std::mem::replace(&mut self.unanswered, true) => self.deadline = now + within,
-            _ => return Outlook::Stopped(self.not_up()),
+            _ => return Outlook::Stopped { why: self.not_up(), moment, seen },
         }
         Outlook::Open
     }

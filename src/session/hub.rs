@@ -52,7 +52,7 @@ pub struct Hub {
 }
 
 pub(super) struct HubState {
-    phase: Phase,
+    pub(super) phase: Phase,
     /// Something is broken, as the configurator has told.
     broken: bool,
     next: u64,
@@ -175,7 +175,7 @@ impl Hub {
     /// waited for.
     fn lock(&self) -> MutexGuard<'_, HubState> {
         if !lock(&self.unwritten).is_empty() {
-            self.catch_up(None);
+            self.catch_up(None, |_| true);
         }
         self.state()
     }

@@ -416,6 +416,7 @@ impl Subsystems {
             return;
         }
         let configurator = lock(&junction.configurator).clone();
+        let seen = hub.epoch();
         let frames = self.safe.frames(&self.clock, configurator.as_ref());
         for (at, known) in self.all.iter().enumerate() {
             let (until, since, within) = {
@@ -425,7 +426,7 @@ impl Subsystems {
             };
             let held = self.safe.hold(hub, frames.as_deref(), known.path, since);
             // What came while the frames were asked for is heard first.
-            if !held && !is_over(until) {
+            if !held && (!is_over(until) || hub.epoch() != seen && now < until + limits::VIEW) {
                 continue;
             }
             let life = &mut lock(&self.lives)[at];

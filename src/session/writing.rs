@@ -5,7 +5,7 @@
 //! what was left, so the order stays that in which things happened.
 
 use super::hub::{Hub, HubState};
-use super::log::{Happening, LogEntry};
+use super::log::{Happening, LogEntry, Phase};
 use super::tap::LogSink;
 use crate::limits;
 use crate::model::{ComponentName, EventName};
@@ -82,13 +82,31 @@ impl Hub {
         self.record(None);
     }
 
-    /// Writes down what components have raised so far, and then this; in simulated time waits for slow observers.
-    fn record(&self, what: Option<(Happening, bool)>) {
-        self.catch_up(what).iter().for_each(|tap| tap.keep_pace());
+    /// Begins a phase where nothing was written down since that count ([`Hub::epoch`]): whatever is told then comes behind it. Answers whether it has begun.
+    pub fn begin_phase(&self, phase: Phase, seen: u64) -> bool {
+        let mut has_begun = false;
+        let begin = |state: &mut HubState| {
+            has_begun = state.epoch == seen;
+            if has_begun {
+                state.phase = phase;
+            }
+            has_begun
+        };
+        self.catch_up(Some((Happening::Phase { phase }, false)), begin).iter().for_each(|tap| tap.keep_pace());
+        has_begun
     }
 
-    /// The same without waiting; answers who may have to be waited for.
-    pub(super) fn catch_up(&self, what: Option<(Happening, bool)>) -> Vec<Arc<dyn LogSink>> {
+    /// Writes down what components have raised so far, and then this; in simulated time waits for slow observers.
+    fn record(&self, what: Option<(Happening, bool)>) {
+        self.catch_up(what, |_| true).iter().for_each(|tap| tap.keep_pace());
+    }
+
+    /// The same without waiting, and only if it may be written behind what they have raised; answers who may have to be waited for.
+    pub(super) fn catch_up(
+        &self,
+        what: Option<(Happening, bool)>,
+        may: impl FnOnce(&mut HubState) -> bool,
+    ) -> Vec<Arc<dyn LogSink>> {
         let (news, observers, taps) = {
             let mut state = self.state();
             // What is raised from here on comes later, also by the clock.
@@ -102,6 +120,7 @@ impl Hub {
                 let what = Happening::Event { event: event.to_string(), from: by.to_string(), safety };
                 news.push((at, state.write(at, what, true)));
             }
+            let what = what.filter(|_| may(&mut state));
             news.extend(what.map(|(what, is_report)| (now, state.write(now, what, is_report))));
             if news.is_empty() {
                 return Vec::new();
@@ -180,6 +199,28 @@ mod tests {
         assert_eq!(times.len(), 4 * EACH, "nothing is lost, and nothing is told twice");
         let back = times.windows(2).filter(|pair| pair[1] < pair[0]).count();
         assert_eq!(back, 0, "times go back");
+    }
+
+    /// What was told before a phase begins was before it: who begins it has to have heard that.
+    #[test]
+    fn a_phase_begins_where_nothing_was_told_since() {
+        let hub = Arc::new(Hub::new(&Clock::real(), [], []));
+        hub.begin_writing();
+        let raised = |hub: &Hub| hub.raised(EventName::new("e_stop").unwrap(), ComponentName::new("A").unwrap());
+        let noted = |hub: &Hub| hub.note(Happening::Stale { event: "e".to_owned() });
+        hub.set_phase(Phase::Deploying);
+        for told in [&raised as &dyn Fn(&Hub), &noted] {
+            let seen = hub.epoch();
+            told(&hub);
+            assert!(!hub.begin_phase(Phase::ShuttingDown, seen));
+            assert_eq!(hub.phase(), Phase::Deploying);
+        }
+        raised(&hub);
+        assert!(hub.begin_phase(Phase::ShuttingDown, hub.epoch()));
+        assert_eq!(hub.phase(), Phase::ShuttingDown);
+        hub.end_writing();
+        let last = hub.log(1);
+        assert!(matches!(last[0].what, Happening::Phase { phase: Phase::ShuttingDown }), "{last:?}");
     }
 
     #[test]
