@@ -3,7 +3,7 @@
 use super::coordinator::{ask_of, edges};
 use super::taken::raised_on_each_way;
 use crate::model::{Ask, Deployment, EventName, Subsystem};
-use crate::statechart::{Chart, EdgeId, EventId, NodeKind, compile};
+use crate::statechart::{Chart, EdgeId, EventId, compile};
 use rustc_hash::FxHashSet;
 
 /// A stop of a subsystem.
@@ -64,11 +64,7 @@ fn told(own: &Deployment, charts: &[Chart], of: &[EventName]) -> Vec<EventName> 
     for chart in charts {
         let heard: Vec<EventId> = of.iter().map(|of| chart.event(*of)).filter(|of| *of != EventId::OTHER).collect();
         let takes_up = |edge: &EdgeId| {
-            let (source, target) = chart.ends(*edge);
-            // The way into a composite state is one to its connector `initial`.
-            let into = chart.kind(target) == NodeKind::Connector && chart.parent(target) == Some(source);
-            let once_more = target == source || into;
-            !once_more && chart.triggers(*edge).is_some_and(|all| heard.iter().any(|of| all.contains(of)))
+            !chart.leads_back(*edge) && chart.triggers(*edge).is_some_and(|all| heard.iter().any(|of| all.contains(of)))
         };
         for edge in edges(chart).filter(takes_up) {
             match raised_on_each_way(chart, edge) {

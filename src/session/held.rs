@@ -3,12 +3,10 @@
 
 use super::halt::StandsStill;
 use super::hub::Hub;
-use super::parts::CoordinatorPart;
 use super::{Session, Unanswered};
 use crate::configurator::{ConfiguratorHandle, FrameView, Requester};
 use crate::limits;
 use crate::model::{Ask, ConfigId, Deployment, EventName, FAULTED, Ident};
-use crate::statechart::EdgeId;
 use crate::time::{Clock, Time, lock};
 use rustc_hash::FxHashSet;
 use std::sync::Mutex;
@@ -61,13 +59,9 @@ impl Session {
             *event != ends && !is_told && self.may_raise(event.as_str()).is_ok()
         };
         // One that is heard and comes back to where it was lets go of nothing.
-        let leaves = |part: &CoordinatorPart, edge: EdgeId| {
-            let (source, target) = part.coordinator.chart().ends(edge);
-            source != target
-        };
         let hears = |event: &EventName| {
             let mut may = self.parts().iter().filter(|part| may_let_go(by, part.name));
-            may.any(|part| part.takes(*event).any(|edge| leaves(part, edge)))
+            may.any(|part| part.takes(*event).any(|edge| !part.chart.leads_back(edge)))
         };
         self.events().into_iter().filter(leads_on).filter(hears).collect()
     }

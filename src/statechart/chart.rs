@@ -236,27 +236,6 @@ pub struct Chart {
     pub(super) wide: Wide,
 }
 
-/// Why a text names no state.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum FindError {
-    /// No state's path ends so.
-    #[error("the coordinator has no state `{name}`{}", near.as_ref().map(|n| format!("; did you mean `{n}`?")).unwrap_or_default())]
-    Unknown {
-        /// What was asked for.
-        name: String,
-        /// The state that may have been meant.
-        near: Option<String>,
-    },
-    /// More than one state's path ends so.
-    #[error("`{name}` is the name of {} states: {}", candidates.len(), candidates.join(", "))]
-    Ambiguous {
-        /// What was asked for.
-        name: String,
-        /// The full names of all that fit.
-        candidates: Vec<String>,
-    },
-}
-
 impl Chart {
     /// How many states and connectors it has.
     #[allow(clippy::len_without_is_empty)] // a chart has at least a root and its initial connector
@@ -343,6 +322,12 @@ impl Chart {
     pub fn ends(&self, edge: EdgeId) -> (NodeId, NodeId) {
         let row = &self.edges[edge.index()];
         (NodeId(row.src), NodeId(row.tgt))
+    }
+
+    /// Whether a transition leads back to where it begins: the way into a composite state is one to its connector `initial`.
+    pub fn leads_back(&self, edge: EdgeId) -> bool {
+        let (source, target) = self.ends(edge);
+        target == source || self.kind(target) == NodeKind::Connector && self.parent(target) == Some(source)
     }
 
     /// The state that a transition neither leaves nor enters.
@@ -433,49 +418,6 @@ impl Chart {
     /// Every place that raises a name.
     pub fn raises(&self) -> &[RaiseSite] {
         &self.raises
-    }
-
-    /// The state that `text` names: by its own name (`operational`), its full name (`root.operational`), or any end of it
-    /// (`sync.copying`).
-    ///
-    /// # Errors
-    /// [`FindError`] when no state or more than one is named so. A full name is never ambiguous.
-    pub fn find(&self, text: &str) -> Result<NodeId, FindError> {
-        let found = self.named(text);
-        match found[..] {
-            [node] => Ok(node),
-            [] => {
-                let last = text.rsplit('.').next().unwrap_or_default();
-                let names: Vec<String> =
-                    self.nodes().filter(|n| self.is_state(*n)).map(|n| self.name(n).to_string()).collect();
-                let near = crate::model::finding::nearest(last, names.iter().map(String::as_str)).map(str::to_owned);
-                Err(FindError::Unknown { name: text.to_owned(), near })
-            }
-            _ => Err(FindError::Ambiguous {
-                name: text.to_owned(),
-                candidates: found.iter().map(|n| self.fqn(*n).to_string()).collect(),
-            }),
-        }
-    }
-
-    /// All states that `text` names, as [`Self::find`] reads it: one where that is a full name.
-    pub fn named(&self, text: &str) -> Vec<NodeId> {
-        let parts: Vec<&str> = text.split('.').collect();
-        let fits = |node: &NodeId| self.is_state(*node) && self.ends_with(*node, &parts);
-        let found: Vec<NodeId> = self.nodes().filter(fits).collect();
-        let whole = found.iter().find(|node| self.depth(**node) + 1 == parts.len());
-        whole.map_or(found.clone(), |whole| vec![*whole])
-    }
-
-    fn ends_with(&self, node: NodeId, parts: &[&str]) -> bool {
-        let mut at = Some(node);
-        for part in parts.iter().rev() {
-            match at {
-                Some(n) if self.name(n).as_str() == *part => at = self.parent(n),
-                _ => return false,
-            }
-        }
-        true
     }
 }
 

@@ -12,6 +12,7 @@
 mod chart;
 mod checks;
 mod compile;
+mod find;
 mod grow;
 mod hook;
 mod machine;
@@ -26,8 +27,9 @@ mod timers;
 mod trace;
 mod wide;
 
-pub use chart::{Chart, EdgeId, EventId, FindError, NodeId, NodeKind, RaiseMoment, RaiseSite};
+pub use chart::{Chart, EdgeId, EventId, NodeId, NodeKind, RaiseMoment, RaiseSite};
 pub use compile::compile;
+pub use find::FindError;
 pub use grow::{Addition, NotGrown};
 pub use hook::{ActionPlace, Doo, FunctionOutput, Hook, HookContext, Nobody, Printer, Raised, Watched};
 pub use machine::Machine;

@@ -391,7 +391,7 @@ fn who_lets_go_of_one_unasked_is_told() {
     for (by, told) in [
         (
             "tgt: failed, events: [e_after(5)], effect: stop.undo",
-            "`e_after(5) s` leads from `root.stopped` to `root.failed`, and `stop.undo` lets go of `stop`",
+            "`e_after(5)@root.stopped` leads from `root.stopped` to `root.failed`, and `stop.undo` lets go of `stop`",
         ),
         ("tgt: failed, events: [stop.ok], effect: undo", "`undo` lets go of what was applied last"),
         ("tgt: up.fast, events: [motor.faulted]", "`fast` takes the place of `stop` there, which is of its group"),
