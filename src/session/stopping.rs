@@ -12,7 +12,6 @@ use crate::coordinator::Class;
 use crate::limits;
 use crate::model::{ConfigId, EventName, Ident, RequestId, Step};
 use crate::stack::Requester;
-use crate::statechart::{EventId, NodeId};
 use crate::time::{Receiver, Time};
 use std::sync::atomic::Ordering;
 use std::time::Duration;
